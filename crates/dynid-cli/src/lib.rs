@@ -44,6 +44,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Man(args) => commands::man::run(args),
         Command::Merge(args) => commands::reduce::merge(args),
         Command::Motion(args) => commands::motion::run(args),
+        Command::Next(args) => commands::next::run(args),
         Command::Online(args) => commands::online::run(args),
         Command::Payload(args) => commands::payload::run(args),
         Command::Predict(args) => commands::predict::run(args),

@@ -182,7 +182,9 @@ impl Problem {
                 of.col_iter().flatten().try_for_each(|x| finite("entry of a combination", *x))?;
                 match *order >= 1.0 && order.is_finite() {
                     true => Ok(()),
-                    false => Err(value("order of the largest deviation", "a finite number of at least 1", *order)),
+                    false => {
+                        Err(value("order of the largest deviation", "a finite number of at least 1", *order))
+                    }
                 }
             }
             Measure::Condition | Measure::Smallest | Measure::Determinant => Ok(()),

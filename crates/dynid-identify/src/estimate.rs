@@ -300,7 +300,8 @@ pub struct BaseValue {
     /// Share of the prior variance that the logs remove, 0 to 1.
     #[serde(default)]
     pub share: Option<f64>,
-    /// Standard deviation (jackknife over time blocks where there are at least 10, else white residuals).
+    /// Standard deviation: jackknife over time blocks where there are at least 10; of 2 to 9 blocks that for white residuals times the root of
+    /// the variance inflation; else that for white residuals.
     pub std: Option<f64>,
     /// Standard deviation for white residuals.
     pub std_white: Option<f64>,

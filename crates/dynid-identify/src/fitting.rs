@@ -1,8 +1,8 @@
 //! The linear fit of a run: method, weights, covariance.
 
 use dynid_estimate::covariance::{
-    BlockLength, BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length,
-    output_inflation, variance_inflation,
+    BlockLength, BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_inflation,
+    block_length, output_inflation, variance_inflation,
 };
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, VarianceSharing, estimate};
 use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whiteness};
@@ -31,6 +31,8 @@ pub struct Fitted {
     pub white: Mat,
     /// Jackknife covariance over time blocks, if there are enough of them.
     pub jackknife: Option<Mat>,
+    /// Of too few blocks for that: `white` times the inflation that their scores tell; `None` of fewer than two.
+    pub inflated: Option<Mat>,
     /// Variance inflation `κ`: by how much coloured residuals inflate the variances that white ones would give.
     pub inflation: f64,
     /// Variance inflation joint by joint, where it can be told.
@@ -44,16 +46,21 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// The covariance to report: jackknife, or for too few blocks that of white residuals.
+    /// The covariance to report: jackknife; for too few blocks that of white residuals, inflated as the blocks say.
     pub fn covariance(&self) -> &Mat {
-        self.jackknife.as_ref().unwrap_or(&self.white)
+        self.jackknife.as_ref().or(self.inflated.as_ref()).unwrap_or(&self.white)
+    }
+
+    /// Whether the covariance to report allows for coloured residuals.
+    pub fn is_robust(&self) -> bool {
+        self.jackknife.is_some() || self.inflated.is_some()
     }
 
     /// Adds covariances between base parameters that come from elsewhere than the rows: `(base parameter, base parameter, covariance)`. Of
     /// those whose column was dropped nothing is known anyway.
     pub(crate) fn add_covariances(&mut self, entries: &[(usize, usize, f64)]) {
         let kept = self.estimate.solution.kept.clone();
-        let to = self.jackknife.as_mut().unwrap_or(&mut self.white);
+        let to = self.jackknife.as_mut().or(self.inflated.as_mut()).unwrap_or(&mut self.white);
         for (a, b, covariance) in entries {
             let places = [a, b].map(|base| kept.iter().position(|k| k == base));
             if let [Some(i), Some(j)] = places {
@@ -260,9 +267,15 @@ impl Fitted {
         let white = estimate.model_covariance();
         let jackknife = (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten();
         let jackknife = jackknife.map(|j| j.covariance);
-        let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
+        let by_scores = match jackknife {
+            None => block_inflation(&estimate.kept_blocks(), &estimate.kept_x()),
+            Some(_) => None,
+        };
+        let of_jackknife = jackknife.as_ref().and_then(|v| variance_inflation(v, &white));
+        let inflation = of_jackknife.or(by_scores).unwrap_or(1.0);
         let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
         Fitted {
+            inflated: by_scores.map(|inflation| &white * inflation),
             white,
             jackknife,
             inflation,

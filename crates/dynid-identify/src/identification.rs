@@ -38,6 +38,9 @@ use crate::tie_test::TieTest;
 use crate::trained_log::{RowFit, TrainedLog};
 use crate::trust::Trust;
 
+/// Time blocks that standard deviations want.
+const BLOCKS_WANTED: f64 = 20.0;
+
 /// An identified model with everything that was found on the way.
 #[derive(Debug)]
 pub struct Identification {
@@ -291,6 +294,19 @@ impl Identification {
             out[*c] = (Some(reported), Some(white));
         }
         out
+    }
+
+    /// Length of all training logs, s.
+    pub fn duration_s(&self) -> f64 {
+        self.trained.iter().map(|log| log.duration_s).sum()
+    }
+
+    /// Time that logs lack for as many independent blocks as standard deviations want, s.
+    pub fn lacking_s(&self) -> f64 {
+        let wanted = BLOCKS_WANTED * self.fitted.block_length.seconds.max(self.fitted.block_s);
+        Some(wanted - self.duration_s())
+            .filter(|lacking| lacking.is_finite())
+            .map_or(0.0, |lacking| lacking.max(0.0))
     }
 
     /// Samples of all training logs.

@@ -31,6 +31,8 @@ pub struct Knowledge {
     pub parameters: Vec<KnownParameter>,
     /// Per output: how its rows count.
     pub rows: Vec<RowPrecision>,
+    /// Time that the logs lack for as many independent blocks as intervals want, s.
+    pub lacking_s: f64,
     /// Time between independent rows of a joint that moves, s: a quarter of the period of the widest kernel's cut-off.
     pub row_spacing_s: f64,
     space: VisibleSpace,
@@ -62,8 +64,11 @@ pub struct KnownParameter {
 /// How rows of an output count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowPrecision {
-    /// Standard deviation of an independent row of the widest kernel, inflation included, N m or N; `None` where no log has such rows.
+    /// Standard deviation of an independent row of the widest kernel, inflation included, N m or N; `None` where nothing says it.
     pub deviation: Option<f64>,
+    /// Whether no log has rows of this output, so that the deviation is taken to be as large a share of its efforts as that of the
+    /// output with the largest share.
+    pub is_assumed: bool,
     /// Whether the model explains the effort. If not, its rows tell nothing of any parameter.
     pub is_explained: bool,
 }
@@ -83,18 +88,16 @@ impl Identification {
             *rows += group.rows as f64;
             *precision += group.rows as f64 * group.weight.powi(2);
         }
-        let weights: BTreeMap<(usize, usize), f64> = (sums.iter())
+        let mut weights: BTreeMap<(usize, usize), f64> = (sums.iter())
             .map(|(key, (rows, precision))| (*key, (precision / rows / inflation[key.0]).sqrt()))
             .collect();
-        let rows = (self.explained.iter().enumerate())
-            .map(|(output, explained)| RowPrecision {
-                deviation: weights.get(&(output, 0)).map(|w| 1.0 / w).filter(|d| d.is_finite()),
-                is_explained: *explained,
-            })
-            .collect();
+        let scales_hz =
+            self.conditioning.as_ref().map_or_else(|| vec![self.kernel_hz], |c| c.scales_hz.clone());
+        let rows = self.row_precisions(&scales_hz, &mut weights);
         Knowledge {
             parameters: self.known_parameters(quantile),
             rows,
+            lacking_s: self.lacking_s(),
             row_spacing_s: 0.25 / self.kernel_hz,
             space,
             information,
@@ -102,6 +105,37 @@ impl Identification {
             weights,
             quantile,
         }
+    }
+
+    /// How rows of every output count; weights of kernels that no log has rows of are added. The variance of a row goes with the cut-off
+    /// of its kernel.
+    fn row_precisions(
+        &self,
+        scales_hz: &[f64],
+        weights: &mut BTreeMap<(usize, usize), f64>,
+    ) -> Vec<RowPrecision> {
+        let deviation = |weights: &BTreeMap<(usize, usize), f64>, output: usize| {
+            let of_scale =
+                |(k, hz): (usize, &f64)| Some((scales_hz[0] / hz).sqrt() / weights.get(&(output, k))?);
+            scales_hz.iter().enumerate().find_map(of_scale).filter(|d| d.is_finite())
+        };
+        let share = (0..self.explained.len())
+            .filter(|j| self.explained[*j] && self.effort_sizes[*j] > 0.0)
+            .filter_map(|j| Some(deviation(weights, j)? / self.effort_sizes[j]))
+            .fold(0.0, f64::max);
+        (self.explained.iter().enumerate())
+            .map(|(output, is_explained)| {
+                let found = deviation(weights, output);
+                let assumed = || Some(share * self.effort_sizes[output]).filter(|d| *d > 0.0);
+                let row = found.or_else(assumed);
+                for (k, hz) in scales_hz.iter().enumerate() {
+                    if let Some(row) = row {
+                        weights.entry((output, k)).or_insert((scales_hz[0] / hz).sqrt() / row);
+                    }
+                }
+                RowPrecision { deviation: row, is_assumed: found.is_none(), is_explained: *is_explained }
+            })
+            .collect()
     }
 
     fn known_parameters(&self, quantile: f64) -> Vec<KnownParameter> {
@@ -139,17 +173,18 @@ impl Knowledge {
         stacked
     }
 
-    /// Information of the rows so far and of further ones that were reduced by the same recipe, each kernel's rows of an output as the fit
-    /// weighs them on the average.
-    pub fn with_rows<'a>(&self, further: impl IntoIterator<Item = &'a ReducedGroup>) -> Factor {
+    /// Information of further rows that were reduced by the same recipe, each kernel's rows of an output as the fit weighs them on the average.
+    pub fn of_rows(&self, further: &[ReducedGroup]) -> Factor {
         let total = self.information.columns();
         let weighted = |group: &ReducedGroup| {
             let weight = self.weights.get(&(group.output, group.scale))?;
             Some(group.merged(total).scaled(*weight))
         };
-        let mut parts: Vec<Factor> = further.into_iter().filter_map(weighted).collect();
-        parts.insert(0, self.information.clone());
-        Factor::merge(&parts.iter().collect::<Vec<_>>())
+        let parts: Vec<Factor> = further.iter().filter_map(weighted).collect();
+        match parts.is_empty() {
+            true => Factor::empty(total),
+            false => Factor::merge(&parts.iter().collect::<Vec<_>>()),
+        }
     }
 
     /// What would be known of all standard parameters with some information.

@@ -34,8 +34,8 @@ mod input_record;
 
 mod joint_stiffness;
 mod journal_doubt;
-pub mod known_friction;
 pub mod knowledge;
+pub mod known_friction;
 mod linear_method;
 mod load_doubt;
 mod load_rounds;

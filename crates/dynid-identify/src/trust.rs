@@ -94,9 +94,9 @@ pub(crate) struct Evidence<'a> {
 /// Half width of intervals of [`CONFIDENCE`] in standard deviations.
 pub fn interval_quantile(fitted: &Fitted) -> f64 {
     let fit = &fitted.estimate;
-    let freedom = match fitted.jackknife {
-        Some(_) => fit.blocks.len() as f64 - 1.0,
-        None => fit.solution.rows as f64 - fit.solution.kept.len() as f64,
+    let freedom = match fitted.is_robust() {
+        true => fit.blocks.len() as f64 - 1.0,
+        false => fit.solution.rows as f64 - fit.solution.kept.len() as f64,
     };
     t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)).unwrap_or(f64::INFINITY)
 }

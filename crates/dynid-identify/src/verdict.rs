@@ -478,9 +478,15 @@ fn blocks(id: &Identification) -> CheckResult {
         Some(id.blocks() as f64),
         "",
         "at least 20, each five correlation times of the residual long",
-        if fitted.jackknife.is_none() {
+        if !fitted.is_robust() {
             "the logs are too short for standard deviations that survive coloured residuals; those shown assume white ones"
                 .to_owned()
+        } else if fitted.jackknife.is_none() {
+            format!(
+                "too few blocks for a jackknife: the standard deviations are those of white residuals times {:.1}, one factor for all \
+                 parameters, which what the residuals of the blocks have in common asks for",
+                fitted.inflation.sqrt()
+            )
         } else if short {
             format!(
                 "the residuals stay correlated for so long that independent blocks would take {wanted:.1} s each, found {:.1} s: \
@@ -561,7 +567,7 @@ fn whiteness(id: &Identification) -> Option<CheckResult> {
         .collect();
     let ratio = |w: &InBandWhiteness| w.distance / w.threshold;
     let (joint, worst) = tested.into_iter().max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))?;
-    let robust = id.fitted.jackknife.is_some();
+    let robust = id.fitted.is_robust();
     Some(check(
         graded(!worst.rejected() || robust, true),
         CheckName::Whiteness,

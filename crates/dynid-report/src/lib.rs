@@ -31,12 +31,12 @@ pub use data::{
     BaseParameter, CarriedReason, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair,
     Consistency, ConsistencyForm, ConsistencyStatus, Counts, CurveStyle, DesignJoint, DesignParameter,
     DesignQuality, DesignReport, DesignStart, Fact, FileJoint, FileJudgement, FileLoss, FramePath,
-    FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointMotion, JointQuality,
-    JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness, Observation, Obstacle,
-    Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance, Pruning, PruningStep,
-    Quality, RandomMotion, ReportData, Robot, Rung, Shape, ShapeParameter, ShapeVerdict, StandardParameter,
-    Starts, Status, StudyReport, StudyRow, StudySection, StudyTable, Trajectory, UnidentifiableColumn,
-    ValidationPrice, Value, Verdict, Warning, Whiteness,
+    FrictionTrial, HeldOut, HeldOutJoint, InputFile, IntervalForecast, Joint, JointDelay, JointMotion,
+    JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness,
+    Observation, Obstacle, Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance,
+    Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot, Rung, Shape, ShapeParameter,
+    ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection, StudyTable,
+    Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
 pub use data::{CurvesByTemperature, JointSection, JointsReport, Surface, TemperatureLevel};
 pub use data::{FindingRow, LogPage, Ranked, Ranking};

@@ -5,6 +5,7 @@ mod config;
 mod limits;
 mod loops;
 mod motion;
+pub mod next;
 mod problem;
 mod record;
 mod report;
@@ -53,6 +54,13 @@ pub enum DesignStep {
         /// Best criterion so far, if any start met all limits.
         best: Option<f64>,
     },
+    /// Looking for the shortest motion: what was found for a period.
+    Length {
+        /// Period, s.
+        period_s: f64,
+        /// Periods after which all wanted intervals are reached; `None`: not within a thousand times the longest record.
+        periods: Option<usize>,
+    },
     /// Predicting what the log will tell.
     Forecast,
 }
@@ -64,6 +72,12 @@ impl fmt::Display for DesignStep {
             DesignStep::Structure => f.write_str("finding base parameters"),
             DesignStep::Starts { best: Some(best), .. } => write!(f, "starts, best {best:.4}"),
             DesignStep::Starts { best: None, .. } => f.write_str("starts, none within all limits yet"),
+            DesignStep::Length { period_s, periods: Some(periods) } => {
+                write!(f, "periods of {period_s} s: {periods} needed")
+            }
+            DesignStep::Length { period_s, periods: None } => {
+                write!(f, "periods of {period_s} s: the longest record is too short")
+            }
             DesignStep::Forecast => f.write_str("predicting what the log will tell"),
         }
     }
@@ -106,13 +120,7 @@ pub struct DesignedTrajectory {
 pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Result<DesignRun, Error> {
     config.check()?;
     progress(DesignStep::Structure);
-    let options = RobotOptions {
-        gravity: config.gravity,
-        couple_mimics: config.couple_mimics,
-        floating_base: false,
-        locked: config.locked.iter().map(|(j, q)| (j.clone(), *q)).collect(),
-    };
-    let robot = Robot::load(&config.robot, &options)?;
+    let robot = load(config)?;
     let set = problem::problem(&robot, config)?;
     let parking = problem::pose(&set, config)?;
     let mut file = Checkpointing::open(config, &set.safety.meshes)?;
@@ -120,7 +128,7 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
         starts: config.search.starts,
         seed: config.search.seed,
         time_budget_s: config.search.time_budget_s,
-        report_samples: REPORT_SAMPLES.max(20 * config.trajectory.harmonics),
+        report_samples: report_samples(config),
         from: None,
     };
     let mut ended = 0;
@@ -144,21 +152,43 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
     if let Some(fault) = fault {
         return Err(fault);
     }
+    finished(robot, set, config, outcome, parking.as_deref(), progress)
+}
+
+/// The robot of a configuration.
+fn load(config: &DesignConfig) -> Result<Robot, Error> {
+    let options = RobotOptions {
+        gravity: config.gravity,
+        couple_mimics: config.couple_mimics,
+        floating_base: false,
+        locked: config.locked.iter().map(|(j, q)| (j.clone(), *q)).collect(),
+    };
+    Robot::load(&config.robot, &options)
+}
+
+/// A design from what its search found.
+fn finished(
+    robot: Robot,
+    set: RobotProblem,
+    config: &DesignConfig,
+    outcome: Outcome,
+    parking: Option<&[f64]>,
+    progress: &mut dyn FnMut(DesignStep),
+) -> Result<DesignRun, Error> {
     let (starts, outcome) = match outcome {
         Outcome::Infeasible(infeasible) => (Vec::new(), Err(infeasible)),
         Outcome::Found(found) => {
             progress(DesignStep::Forecast);
-            let coefficients = found.coefficients;
-            let forecast =
-                forecast(&set.problem, &coefficients, settings.report_samples).ok_or_else(|| {
-                    Error::Unsupported("the designed trajectory leaves parameters unseen".to_owned())
-                })?;
-            let motion = DesignedMotion::new(&set, config, &coefficients, parking.as_deref())?;
+            let (coefficients, samples) = (found.coefficients, report_samples(config));
+            let forecast = forecast(&set.problem, &coefficients, samples).ok_or_else(|| {
+                Error::Unsupported("the designed trajectory leaves parameters unseen".to_owned())
+            })?;
+            let motion = DesignedMotion::new(&set, config, &coefficients, parking)?;
             let designed = DesignedTrajectory {
                 best: found.best,
                 forecast,
                 broken: limit_points(&set.problem, &coefficients, CHECK_SAMPLES, 1e-6),
-                uses: limit_points(&set.problem, &coefficients, settings.report_samples, f64::NEG_INFINITY),
+                uses: limit_points(&set.problem, &coefficients, samples, f64::NEG_INFINITY),
                 motion,
                 coefficients,
             };
@@ -166,6 +196,11 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
         }
     };
     Ok(DesignRun { robot, set, starts, outcome })
+}
+
+/// Samples of a period on which criterion and forecast are taken.
+fn report_samples(config: &DesignConfig) -> usize {
+    REPORT_SAMPLES.max(20 * config.trajectory.harmonics)
 }
 
 impl DesignRun {

@@ -143,6 +143,8 @@ impl Shown<'_> {
                     "standard deviations",
                     if self.fitted.jackknife.is_some() {
                         "jackknife over time blocks"
+                    } else if self.fitted.is_robust() {
+                        "white residuals, inflated as few time blocks say"
                     } else {
                         "white residuals (too few time blocks for a jackknife)"
                     },

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
+use dynid::design::next::Wanted;
 
 use super::elements::with_elements;
 use super::robot::joint_value;
@@ -34,26 +35,15 @@ pub(crate) enum ColumnsArg {
     Inertial,
 }
 
+/// What every designed motion is asked by: form, limits, search, where its files go.
 #[derive(Debug, Args)]
-pub(crate) struct DesignArgs {
-    /// Configuration (TOML), or a robot file; `-`: standard input.
-    #[arg(value_hint = ValueHint::FilePath)]
-    pub(crate) input: PathBuf,
-    /// Output folder (default: dynid-design).
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
-    pub(crate) out: Option<PathBuf>,
+pub(crate) struct DesignedArgs {
     /// Write the motion also for what plays it, comma separated.
     #[arg(long, value_enum, value_name = "FORMAT,..", value_delimiter = ',')]
     pub(crate) also: Vec<PlaybackArg>,
-    /// Period, s (default: 20).
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub(crate) period: Option<f64>,
     /// Harmonics (default: 5).
     #[arg(long, value_name = "N")]
     pub(crate) harmonics: Option<usize>,
-    /// Recorded periods (default: 1).
-    #[arg(long, value_name = "N")]
-    pub(crate) periods: Option<usize>,
     /// Rate of commanded and recorded samples, Hz (default: 500).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate_hz: Option<f64>,
@@ -69,21 +59,6 @@ pub(crate) struct DesignArgs {
     /// Share of the robot file's limits that may be used (default: 1).
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub(crate) share: Option<f64>,
-    /// What is minimised (default: relative-std, without inertias in the robot file unit-condition).
-    #[arg(long, value_enum)]
-    pub(crate) criterion: Option<CriterionArg>,
-    /// Parameters that count (default: all).
-    #[arg(long, value_enum)]
-    pub(crate) columns: Option<ColumnsArg>,
-    /// Standard deviation of the effort's noise at all joints, N m or N.
-    #[arg(long, value_name = "STD", allow_negative_numbers = true)]
-    pub(crate) noise: Option<f64>,
-    /// Trajectory that is recorded as well, so that its information counts; repeat for several.
-    #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
-    pub(crate) earlier: Vec<PathBuf>,
-    /// Elements at every joint, comma separated; `none`: rigid bodies alone.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint, comma separated; `none`: rigid bodies alone."))]
-    pub(crate) elements: Option<Vec<String>>,
     /// Hold a joint at a position, rad or m.
     #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
     pub(crate) lock: Vec<(String, f64)>,
@@ -108,6 +83,41 @@ pub(crate) struct DesignArgs {
     /// Seed of the first start (default: 1).
     #[arg(long)]
     pub(crate) seed: Option<u64>,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
+    #[command(flatten)]
+    pub(crate) print: PrintArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DesignArgs {
+    /// Configuration (TOML), or a robot file; `-`: standard input.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) input: PathBuf,
+    /// Output folder (default: dynid-design).
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub(crate) out: Option<PathBuf>,
+    /// Period, s (default: 20).
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) period: Option<f64>,
+    /// Recorded periods (default: 1).
+    #[arg(long, value_name = "N")]
+    pub(crate) periods: Option<usize>,
+    /// What is minimised (default: relative-std, without inertias in the robot file unit-condition).
+    #[arg(long, value_enum)]
+    pub(crate) criterion: Option<CriterionArg>,
+    /// Parameters that count (default: all).
+    #[arg(long, value_enum)]
+    pub(crate) columns: Option<ColumnsArg>,
+    /// Standard deviation of the effort's noise at all joints, N m or N.
+    #[arg(long, value_name = "STD", allow_negative_numbers = true)]
+    pub(crate) noise: Option<f64>,
+    /// Trajectory that is recorded as well, so that its information counts; repeat for several.
+    #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
+    pub(crate) earlier: Vec<PathBuf>,
+    /// Elements at every joint, comma separated; `none`: rigid bodies alone.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint, comma separated; `none`: rigid bodies alone."))]
+    pub(crate) elements: Option<Vec<String>>,
     /// Begin no start after this time, and end those that began, s (default: all run).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time_budget: Option<f64>,
@@ -115,7 +125,30 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) checkpoint: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) force: ForceArgs,
+    pub(crate) designed: DesignedArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct NextArgs {
+    /// Configuration of a design (TOML), for limits, safety and form of the motion, or a robot file.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) input: PathBuf,
+    /// Factor file of the logs so far (`dynid reduce` writes them); repeat for several.
+    #[arg(long, required = true, value_name = "FACTORS", value_hint = ValueHint::FilePath)]
+    pub(crate) after: Vec<PathBuf>,
+    /// Parameter and half width of the 95 % interval that is wanted of it, in its unit or in per cent of its value; `*` in a name stands for
+    /// any text; repeat for several.
+    #[arg(long, required = true, value_name = "NAME=WIDTH", value_parser = str::parse::<Wanted>)]
+    pub(crate) want: Vec<Wanted>,
+    /// Longest record, s.
+    #[arg(long, value_name = "S", default_value_t = 300.0, allow_negative_numbers = true)]
+    pub(crate) longest: f64,
+    /// Longest period that is tried, beside its half and its quarter, s (default: 20).
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) period: Option<f64>,
+    /// Output folder (default: dynid-next).
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) print: PrintArgs,
+    pub(crate) designed: DesignedArgs,
 }

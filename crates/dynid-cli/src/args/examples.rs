@@ -210,6 +210,20 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "next",
+        negative: "no wanted interval can be reached, there is no motion within all limits, or a format of --also cannot hold it",
+        examples: &[
+            (
+                "What to record next, so that a friction is known to 5 %",
+                "next arm.urdf --after arm.factors --want joint2.fc=5%",
+            ),
+            (
+                "So that all rotors are known to 0.01 kg m², with limits by a design file",
+                "next design.toml --after cell.factors --after lab.factors --want '*.Ia=0.01'",
+            ),
+        ],
+    },
+    Ending {
         command: "online",
         negative: "something changed",
         examples: &[

@@ -18,7 +18,7 @@ pub(crate) use dynid_terminal::args::{ForceArgs, PrintArgs};
 pub(crate) use dynid_terminal::study::StudyArgs;
 
 pub(crate) use about::{CompletionsArgs, ExplainArgs, ManArgs};
-pub(crate) use design::{ColumnsArg, CriterionArg, DesignArgs};
+pub(crate) use design::{ColumnsArg, CriterionArg, DesignArgs, DesignedArgs, NextArgs};
 pub(crate) use experiments::{
     BacklashArgs, ClearanceArgs, FrictionTestArgs, GainsArgs, PayloadArgs, ServoArgs,
 };
@@ -100,6 +100,9 @@ pub(crate) enum Command {
     /// Make test motions within the limits: sweeps, tracks, circles, small sinusoids, pauses, loads; writes trajectory files,
     /// motion.json and report.html.
     Motion(Box<MotionArgs>),
+    /// Design what to record next: the shortest motion that brings parameters to wanted intervals, given the factors of all earlier logs;
+    /// writes trajectory files, next.json and report.html.
+    Next(Box<NextArgs>),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes.
     Online(OnlineArgs),
     /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF

@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use dynid::config::PerJoint;
-use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
+use dynid::design::{
+    ColumnsName, CriterionName, DesignConfig, DesignRecord, DesignedMotion, MotionPaths, design,
+};
+use dynid::io::trajectory::Playback;
 use dynid::record::Outcome;
 use dynid_terminal::message::{Failure, Notes, data};
-use dynid_terminal::outputs;
+use dynid_terminal::outputs::{self, Outputs};
 use dynid_terminal::progress::Progress;
 
 use super::{element_names, playback, table};
-use crate::args::{ColumnsArg, CriterionArg, DesignArgs, ForceArgs};
+use crate::args::{ColumnsArg, CriterionArg, DesignArgs, DesignedArgs, ForceArgs};
 
 const DEFAULT_OUT: &str = "dynid-design";
 
@@ -18,23 +21,11 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let config = configuration(args)?;
     config.check()?;
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let paths = MotionPaths {
-        coefficients: out.join("trajectory.json"),
-        samples: out.join("trajectory.csv"),
-        ros_yaml: out.join("trajectory.ros2.yaml"),
-        ros_json: out.join("trajectory.ros2.json"),
-    };
-    let record_path = out.join("design.json");
-    let report_path = out.join("report.html");
-    let also = playback::files(&args.also, &out);
-    let own =
-        [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path, &report_path];
-    let files: Vec<PathBuf> =
-        own.iter().map(|path| (*path).clone()).chain(also.iter().map(|(_, path)| path.clone())).collect();
+    let files = MotionFiles::new(&out, "design.json", &args.designed);
     let earlier = config.earlier.iter().map(PathBuf::as_path);
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
     if let Some(checkpoint) = &config.search.checkpoint {
-        let results = files.iter().map(|file| ("--out", file.as_path()));
+        let results = files.all.iter().map(|file| ("--out", file.as_path()));
         outputs::check(
             &results.chain([("--checkpoint", checkpoint.as_path())]).collect::<Vec<_>>(),
             &inputs,
@@ -45,64 +36,81 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
             return Err(Failure::Usage(text, "give the checkpoint a file of its own"));
         }
     }
-    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
-    let progress = Progress::new(args.print.quiet);
+    let DesignedArgs { force, print, .. } = &args.designed;
+    let set = outputs::prepare_folder(&files.all, &inputs, *force)?;
+    let progress = Progress::new(print.quiet);
     let run = design(&config, &mut |step| progress.design(step))?;
     let record = run.record(&config)?;
     let report = run.report(&config, &record)?;
     drop(progress);
 
-    let mut all = true;
-    if let Ok(designed) = &run.outcome {
-        let text = |format, file: &Path| designed.motion.playback(format, file);
-        all = playback::write(&also, (&set, own.len()), text)?;
-        let staged = |number: usize| set.staged(number).to_owned();
-        let [coefficients, samples, ros_yaml, ros_json] = [0, 1, 2, 3].map(staged);
-        designed.motion.write(&MotionPaths { coefficients, samples, ros_yaml, ros_json })?;
-    }
+    let motion = run.outcome.as_ref().ok().map(|designed| &designed.motion);
     let text = serde_json::to_string_pretty(&record).map_err(|e| Failure::Output(e.into()))? + "\n";
-    set.write(4, text.as_bytes())?;
-    set.write(5, report.as_bytes())?;
+    let all = files.write(&set, motion, &text, &report)?;
     let written = set.publish()?;
-    let notes = Notes::new(args.print.quiet);
+    let notes = Notes::new(print.quiet);
     notes.warnings(&record.verdict.warnings);
-    data(&if args.print.json { text } else { summary(&record) })?;
+    data(&if print.json { text } else { summary(&record) })?;
     notes.written(&written);
     Ok(u8::from(record.verdict.status == Outcome::Fail || !all))
 }
 
+/// Files of a designed motion, its record and its page among them.
+pub(super) struct MotionFiles {
+    /// All of them; the first are those of the motion, record and page.
+    pub(super) all: Vec<PathBuf>,
+    also: Vec<(Playback, PathBuf)>,
+}
+
+/// Files beside those for what plays a motion.
+const OWN_FILES: usize = 6;
+
+impl MotionFiles {
+    pub(super) fn new(out: &Path, record: &str, args: &DesignedArgs) -> Self {
+        let own: [&str; OWN_FILES] = [
+            "trajectory.json",
+            "trajectory.csv",
+            "trajectory.ros2.yaml",
+            "trajectory.ros2.json",
+            record,
+            "report.html",
+        ];
+        let also = playback::files(&args.also, out);
+        let own = own.iter().map(|name| out.join(name));
+        MotionFiles { all: own.chain(also.iter().map(|(_, path)| path.clone())).collect(), also }
+    }
+
+    /// Writes them; gives whether the motion was written for all that play it.
+    pub(super) fn write(
+        &self,
+        set: &Outputs,
+        motion: Option<&DesignedMotion>,
+        record: &str,
+        report: &str,
+    ) -> Result<bool, Failure> {
+        let mut all = true;
+        if let Some(motion) = motion {
+            all =
+                playback::write(&self.also, (set, OWN_FILES), |format, file| motion.playback(format, file))?;
+            let staged = |number: usize| set.staged(number).to_owned();
+            let [coefficients, samples, ros_yaml, ros_json] = [0, 1, 2, 3].map(staged);
+            motion.write(&MotionPaths { coefficients, samples, ros_yaml, ros_json })?;
+        }
+        set.write(4, record.as_bytes())?;
+        set.write(5, report.as_bytes())?;
+        Ok(all)
+    }
+}
+
 /// The configuration file, or one made of a robot file, with flags over it.
 fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
-    let is_xml = args.input.extension().is_some_and(|e| e == "sdf" || e == "urdf" || e == "xml");
-    let robot = || DesignConfig { robot: args.input.clone(), ..DesignConfig::default() };
-    let mut config = if is_xml {
-        robot()
-    } else {
-        match DesignConfig::read(&args.input) {
-            Ok(config) => config,
-            Err(error) => match dynid::io::robot::read(&args.input) {
-                Ok(_) => robot(),
-                Err(fault) if is_robot(&args.input) => return Err(fault.into()),
-                Err(_) => return Err(error.into()),
-            },
-        }
-    };
+    let mut config = designed(&args.input, &args.designed)?;
     if args.out.is_some() {
         config.out.clone_from(&args.out);
     }
     let t = &mut config.trajectory;
     t.period_s = args.period.unwrap_or(t.period_s);
-    t.harmonics = args.harmonics.unwrap_or(t.harmonics);
     t.periods = args.periods.unwrap_or(t.periods);
-    t.sample_rate_hz = args.rate_hz.unwrap_or(t.sample_rate_hz);
-    t.rest &= !args.no_rest;
-    if args.park && t.parking.is_none() {
-        t.parking = Some(std::collections::BTreeMap::new());
-    }
-    if let Some(acceleration) = args.acceleration {
-        config.limits.acceleration = PerJoint::All(acceleration);
-    }
-    config.limits.share = args.share.unwrap_or(config.limits.share);
     match args.criterion {
         Some(CriterionArg::RelativeStd) => config.criterion.name = Some(CriterionName::RelativeStd),
         Some(CriterionArg::UnitCondition) => config.criterion.name = Some(CriterionName::UnitCondition),
@@ -125,6 +133,40 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
     if args.elements.is_some() {
         config.elements.default = element_names(args.elements.as_deref());
     }
+    config.search.time_budget_s = args.time_budget.or(config.search.time_budget_s);
+    if args.checkpoint.is_some() {
+        config.search.checkpoint.clone_from(&args.checkpoint);
+    }
+    Ok(config)
+}
+
+/// The configuration of a designed motion from its file, or from a robot file, with flags over it.
+pub(super) fn designed(input: &Path, args: &DesignedArgs) -> Result<DesignConfig, Failure> {
+    let is_xml = input.extension().is_some_and(|e| e == "sdf" || e == "urdf" || e == "xml");
+    let robot = || DesignConfig { robot: input.to_owned(), ..DesignConfig::default() };
+    let mut config = if is_xml {
+        robot()
+    } else {
+        match DesignConfig::read(input) {
+            Ok(config) => config,
+            Err(error) => match dynid::io::robot::read(input) {
+                Ok(_) => robot(),
+                Err(fault) if is_robot(input) => return Err(fault.into()),
+                Err(_) => return Err(error.into()),
+            },
+        }
+    };
+    let t = &mut config.trajectory;
+    t.harmonics = args.harmonics.unwrap_or(t.harmonics);
+    t.sample_rate_hz = args.rate_hz.unwrap_or(t.sample_rate_hz);
+    t.rest &= !args.no_rest;
+    if args.park && t.parking.is_none() {
+        t.parking = Some(std::collections::BTreeMap::new());
+    }
+    if let Some(acceleration) = args.acceleration {
+        config.limits.acceleration = PerJoint::All(acceleration);
+    }
+    config.limits.share = args.share.unwrap_or(config.limits.share);
     config.locked.extend(args.lock.iter().cloned());
     let safety = &mut config.safety;
     safety.floor &= !args.no_floor;
@@ -132,13 +174,8 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
     safety.self_collision &= !args.no_self_collision;
     safety.margin_m = args.margin.unwrap_or(safety.margin_m);
     config.package_dirs.extend(args.package_dir.iter().cloned());
-    let s = &mut config.search;
-    s.starts = args.starts.unwrap_or(s.starts);
-    s.seed = args.seed.unwrap_or(s.seed);
-    s.time_budget_s = args.time_budget.or(s.time_budget_s);
-    if args.checkpoint.is_some() {
-        s.checkpoint.clone_from(&args.checkpoint);
-    }
+    config.search.starts = args.starts.unwrap_or(config.search.starts);
+    config.search.seed = args.seed.unwrap_or(config.search.seed);
     Ok(config)
 }
 

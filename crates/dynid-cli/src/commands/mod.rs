@@ -18,6 +18,7 @@ pub(crate) mod init;
 pub(crate) mod inspect;
 pub(crate) mod man;
 pub(crate) mod motion;
+pub(crate) mod next;
 pub(crate) mod online;
 pub(crate) mod payload;
 mod playback;

@@ -19,6 +19,37 @@ pub fn output_inflation(groups: &[ReducedGroup], weights: &[f64], x: &[f64]) -> 
     (0..outputs).map(|output| inflation(groups, weights, x, output)).collect()
 }
 
+/// By how much coloured residuals inflate the variances that white ones would give, from the scores of time blocks, however few:
+/// `κ = max(1, Σ_b ‖R⁻ᵀ g_b‖² / (p - Σ_b ‖R⁻ᵀ R_bᵀ R_b R⁻¹‖²_F))`.
+///
+/// `blocks`: weighted factors in `p` independent columns, one per time block; `x`: their joint least-squares solution. `R` is their joint factor,
+/// `g_b` the score of a block at `x`. For white residuals of unit weighted variance the numerator has the denominator as its expectation,
+/// since the fit takes part of every score away. One number for all parameters, where a [jackknife](super::jackknife()) has one for each but needs
+/// ten blocks or more. `None` with fewer than two blocks, and where one block holds everything.
+///
+/// Source: Bell & McCaffrey 2002 for the correction.
+pub fn block_inflation(blocks: &[Factor], x: &[f64]) -> Option<f64> {
+    /// Share of the expectation below which a score says nothing of the residuals.
+    const LEAST: f64 = 0.1;
+    if blocks.len() < 2 || x.is_empty() {
+        return None;
+    }
+    let merged = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let inverse = dynid_linalg::triangular::inverse(&merged.r_matrix());
+    let (mut sum, mut taken) = (0.0, 0.0);
+    for block in blocks {
+        let score = block.score(x);
+        for j in 0..x.len() {
+            sum += (0..=j).map(|i| inverse[(i, j)] * score[i]).sum::<f64>().powi(2);
+        }
+        let share = block.r_matrix() * &inverse;
+        taken += (share.transpose() * &share).norm_l2().powi(2);
+    }
+    let expected = x.len() as f64 - taken;
+    let found = sum / expected;
+    (expected > LEAST * x.len() as f64 && found.is_finite()).then(|| found.max(1.0))
+}
+
 fn inflation(groups: &[ReducedGroup], weights: &[f64], x: &[f64], output: usize) -> Option<f64> {
     let own: Vec<(&ReducedGroup, f64)> =
         groups.iter().zip(weights.iter().copied()).filter(|(g, _)| g.output == output).collect();

@@ -14,7 +14,7 @@ mod sandwich;
 pub use block_length::{BlockLength, BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length};
 pub use bootstrap::{Bootstrap, BootstrapSettings, bootstrap};
 pub use hac::{hac_bartlett, hac_bartlett_logs, hac_lag};
-pub use inflation::output_inflation;
+pub use inflation::{block_inflation, output_inflation};
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
 pub(crate) use jackknife::{change_without, jackknife_of, running_merges};
 pub use sandwich::{block_sandwich, block_sandwich_with};

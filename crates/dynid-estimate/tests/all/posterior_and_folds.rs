@@ -1,7 +1,7 @@
 //! Posterior of single parameters, variance inflation per output, and estimators compared on held-out folds.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
-use dynid_estimate::covariance::output_inflation;
+use dynid_estimate::covariance::{block_inflation, output_inflation};
 use dynid_estimate::folds::{FoldSettings, contiguous_folds};
 use dynid_estimate::held_out::compare;
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
@@ -155,4 +155,41 @@ fn residuals_of_rows_know_where_they_are() {
     let covered = found[0].coverage(40);
     let expected: Vec<usize> = (8..=20).chain(28..=36).collect();
     assert_eq!((0..40).filter(|s| covered[*s]).collect::<Vec<_>>(), expected);
+}
+
+/// One inflation from few blocks: 1 for white residuals, the size of the colour for residuals that a block shares, whatever the number of
+/// parameters beside that of blocks.
+#[test]
+fn few_blocks_tell_one_inflation() {
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let (columns, rows) = (30, 240);
+    for (blocks, shared) in [(2, 0.0), (5, 0.0), (9, 0.0), (5, 0.3), (9, 0.3)] {
+        let mut sum = 0.0;
+        const RUNS: usize = 60;
+        for _ in 0..RUNS {
+            let factors: Vec<Factor> = (0..blocks)
+                .map(|_| {
+                    // What a block's residuals have in common follows its rows by way of the columns.
+                    let common: Vec<f64> = (0..columns).map(|_| shared * normal()).collect();
+                    let mut builder = FactorBuilder::new(columns);
+                    for _ in 0..rows {
+                        let row: Vec<f64> = (0..columns).map(|_| normal()).collect();
+                        let model: f64 = row.iter().zip(&common).map(|(w, c)| w * c).sum();
+                        builder.push_row(&row, model + normal()).unwrap();
+                    }
+                    builder.finish()
+                })
+                .collect();
+            let merged = Factor::merge(&factors.iter().collect::<Vec<_>>());
+            sum += block_inflation(&factors, &merged.solve()).unwrap();
+        }
+        // Scores of variance J_b + s² J_b² with J_b = rows: inflation 1 + rows s².
+        let expected = 1.0 + rows as f64 * shared * shared;
+        let mean = sum / RUNS as f64;
+        // Rows are few beside columns, so that the largest of 1 and a scatter of some per cent counts.
+        assert!((mean / expected - 1.0).abs() < 0.15, "{blocks} {shared}: {mean} against {expected}");
+    }
+    let one = [FactorBuilder::new(2).finish()];
+    assert_eq!(block_inflation(&one, &[0.0; 2]), None);
 }

@@ -111,8 +111,9 @@ fn largest_deviations_lie_between_the_largest_and_the_trace() {
     let columns = problem("indy7", weights.clone(), Criterion::raw(Measure::Determinant), 40)
         .map(|p| p.model.columns().len());
     let Some(columns) = columns else { return };
-    let coefficients: Vec<Vec<f64>> =
-        (0..6).map(|j| (0..11).map(|k| 0.3 * (1.0 + 3.0 * j as f64 + 7.0 * k as f64).sin()).collect()).collect();
+    let coefficients: Vec<Vec<f64>> = (0..6)
+        .map(|j| (0..11).map(|k| 0.3 * (1.0 + 3.0 * j as f64 + 7.0 * k as f64).sin()).collect())
+        .collect();
     let value = |measure: Measure| {
         let problem = problem("indy7", weights.clone(), Criterion::raw(measure), 40).unwrap();
         criterion_gradient(&problem, &coefficients, 40).unwrap().0
@@ -127,7 +128,10 @@ fn largest_deviations_lie_between_the_largest_and_the_trace() {
     assert!((value(Measure::Largest { of: of.clone(), order: 1.0 }) - trace).abs() < 1e-9);
     for order in [4.0, 40.0, 400.0] {
         let found = value(Measure::Largest { of: of.clone(), order });
-        assert!(found >= largest - 1e-9 && found <= largest + 3_f64.ln() / order + 1e-9, "{order}: {found} {largest}");
+        assert!(
+            found >= largest - 1e-9 && found <= largest + 3_f64.ln() / order + 1e-9,
+            "{order}: {found} {largest}"
+        );
     }
 }
 

@@ -55,7 +55,8 @@ pub struct HeldOutRecord {
 /// What the residuals say about the standard deviations.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PrecisionRecord {
-    /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters).
+    /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters; of fewer than ten
+    /// time blocks one number for all, from their scores).
     pub variance_inflation: f64,
     /// Variance inflation per joint.
     pub variance_inflation_per_joint: Vec<Option<f64>>,

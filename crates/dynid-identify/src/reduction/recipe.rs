@@ -331,6 +331,13 @@ impl Recipe {
         Recipe { reading, ..self }
     }
 
+    /// Returns the recipe without the look at logs before they are reduced, for logs that were made by the model itself.
+    #[must_use]
+    pub fn without_preflight(mut self) -> Self {
+        self.settings.preflight = Preflight::Off;
+        self
+    }
+
     /// The problem without logs: robot, elements, model, what is known before a fit.
     ///
     /// # Errors

@@ -5,9 +5,6 @@ use crate::identification::Identification;
 use crate::joint_stiffness;
 use crate::settings::Preflight;
 
-/// Blocks that standard deviations want.
-const BLOCKS_WANTED: f64 = 20.0;
-
 /// The remedy of a check.
 pub(super) fn of(id: &Identification, check: CheckName) -> String {
     let files = &id.settings.files;
@@ -112,10 +109,9 @@ fn unexplained(id: &Identification) -> &str {
 
 /// A log of the length that blocks want.
 fn longer(id: &Identification) -> String {
-    let fitted = &id.fitted;
-    let wanted = BLOCKS_WANTED * fitted.block_length.seconds.max(fitted.block_s);
-    let have: f64 = id.trained.iter().map(|log| log.duration_s).sum();
-    match wanted.is_finite() && wanted > have {
+    let (have, lacking) = (id.duration_s(), id.lacking_s());
+    let wanted = have + lacking;
+    match lacking > 0.0 {
         true => format!(
             "record {wanted:.0} s in place of {have:.0} s, in one log or several `[[log]]`s (`{}` gives a motion that repeats)",
             id.settings.files.design() + " --periods 3"

@@ -35,7 +35,8 @@ pub use consistency::{
 };
 pub use design::{
     ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, FramePath,
-    JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
+    IntervalForecast, JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts,
+    Trajectory,
 };
 pub use files::{FileJoint, FileJudgement, FileLoss};
 pub use first::Judged;

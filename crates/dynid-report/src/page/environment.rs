@@ -16,7 +16,7 @@ pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 33] = [
+const TEMPLATES: [(&str, &str); 34] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -39,6 +39,7 @@ const TEMPLATES: [(&str, &str); 33] = [
     ("conditioning.html", include_str!("../../template/conditioning.html")),
     (DESIGN_PAGE, include_str!("../../template/design/page.html")),
     ("design/trajectory.html", include_str!("../../template/design/trajectory.html")),
+    ("design/intervals.html", include_str!("../../template/design/intervals.html")),
     ("design/forecast.html", include_str!("../../template/design/forecast.html")),
     ("design/parameters.html", include_str!("../../template/design/parameters.html")),
     ("design/limits.html", include_str!("../../template/design/limits.html")),

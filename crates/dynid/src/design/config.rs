@@ -264,6 +264,9 @@ pub enum CriterionName {
     D,
     /// E-optimal: smallest singular value.
     E,
+    /// Intervals that are wanted of parameters, given the factors of earlier logs: what `dynid next` makes narrow enough, and no design by
+    /// itself.
+    Intervals,
 }
 
 /// Parameters that are to become visible.

@@ -91,20 +91,32 @@ fn refuse_springs(robot: &Robot) -> Result<(), Error> {
     }
 }
 
-pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
-    let poses = loops::poses(robot)?;
-    if let (None, Some(x)) = (&poses, config.limits.singularity) {
-        return Err(Error::setting("limits.singularity", "a mechanism with loops, which it is for", x));
-    }
+/// The model that a design is for.
+pub(super) struct Subject {
+    pub(super) model: Arc<RobotModel>,
+    /// Values of all its parameters; `None` if nothing states inertias.
+    pub(super) nominal: Option<Vec<f64>>,
+    /// Parameters that are to become visible.
+    pub(super) excitation: RobotExcitation,
+    /// Standard deviations of the outputs' noise, where they are known from logs.
+    pub(super) noise: Option<Vec<f64>>,
+}
+
+/// Refuses robots that no joint trajectory is designed for.
+pub(super) fn refuse(robot: &Robot) -> Result<(), Error> {
     let mechanism = &robot.mechanism;
     if mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
             "a floating base follows no joint trajectory: design for the arm alone".to_owned(),
         ));
     }
-    refuse_springs(robot)?;
+    refuse_springs(robot)
+}
+
+/// The model of the robot file and of the elements of a configuration.
+fn subject(robot: &Robot, config: &DesignConfig) -> Result<Subject, Error> {
+    let mechanism = &robot.mechanism;
     let all = mechanism.rate_names();
-    let joints: Vec<String> = loops::coordinates(robot).into_iter().map(|rate| all[rate].clone()).collect();
     let mut elements = robot.elements.with_ideal_bearings();
     for (joint, list) in &config.elements.joint {
         known(joint, &all)?;
@@ -123,6 +135,53 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         .with_loops(robot.closed.clone());
     let model = plan.tied_model(mechanism)?;
     let model = Arc::new(with_nominal_shape(model, &plan, &config.values)?);
+    let nominal = match mechanism.bodies().iter().any(|b| b.stated) {
+        true => Some(nominal_parameters(&model, &plan, &config.values)?),
+        false => None,
+    };
+    Ok(Subject { excitation: columns(config, &model, nominal.as_deref()), model, nominal, noise: None })
+}
+
+/// The problem of a design from a robot file.
+pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
+    refuse(robot)?;
+    let subject = subject(robot, config)?;
+    let excitation = subject.excitation.clone();
+    let name = match config.criterion.name {
+        Some(CriterionName::RelativeStd) if subject.nominal.is_none() => {
+            return Err(Error::setting(
+                "criterion.name",
+                "a criterion without nominal parameters: the robot file states no inertias",
+                "relative-std",
+            ));
+        }
+        Some(name) => name,
+        None if subject.nominal.is_some() => CriterionName::RelativeStd,
+        None => CriterionName::UnitCondition,
+    };
+    let criterion = criterion(name, config, &excitation)?;
+    let mut set = problem_of(robot, config, subject, name, criterion)?;
+    let spacing = config.criterion.correlation_time_s.max(1.0 / config.trajectory.sample_rate_hz);
+    set.problem.prior = earlier(config, &set.problem, &excitation, spacing, &mut set.earlier)?;
+    Ok(set)
+}
+
+/// The problem of a design for a model of a robot.
+pub(super) fn problem_of(
+    robot: &Robot,
+    config: &DesignConfig,
+    subject: Subject,
+    name: CriterionName,
+    criterion: Criterion,
+) -> Result<RobotProblem, Error> {
+    let Subject { model, nominal, excitation, noise: of_logs } = subject;
+    let poses = loops::poses(robot)?;
+    if let (None, Some(x)) = (&poses, config.limits.singularity) {
+        return Err(Error::setting("limits.singularity", "a mechanism with loops, which it is for", x));
+    }
+    let mechanism = &robot.mechanism;
+    let all = mechanism.rate_names();
+    let joints: Vec<String> = loops::coordinates(robot).into_iter().map(|rate| all[rate].clone()).collect();
     if !model.channels().is_empty() {
         return Err(Error::Unsupported(
             "elements that read channels such as currents say nothing about motion: leave them out of a design"
@@ -133,42 +192,26 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         mechanism.frame(frame).map_err(ConstraintError::from).map_err(DesignError::from)?;
     }
     let mut assumptions = Vec::new();
-    let stated = mechanism.bodies().iter().any(|b| b.stated);
-    let nominal = match stated {
-        true => Some(nominal_parameters(&model, &plan, &config.values)?),
-        false => {
-            assumptions.push(
-                "the robot file states no inertias: efforts and relative standard deviations are unknown"
-                    .to_owned(),
-            );
-            None
-        }
-    };
+    if nominal.is_none() {
+        assumptions.push(
+            "the robot file states no inertias: efforts and relative standard deviations are unknown"
+                .to_owned(),
+        );
+    }
     let limits = joint_limits(robot, config, &joints, &mut assumptions)?;
     let effort_limits = effort_limits(robot, config, &joints)?;
     let kept = Kept { limits: &limits, effort_limits: &effort_limits, poses: poses.as_ref() };
     let (constraints, safety) =
         constraints(robot, config, &model, nominal.as_deref(), &kept, &mut assumptions)?;
     let typical = nominal.as_ref().map(|n| typical_efforts(&model, n));
-    let noise = noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?;
-
-    let excitation = columns(config, &model, nominal.as_deref());
-    let name = match config.criterion.name {
-        Some(CriterionName::RelativeStd) if nominal.is_none() => {
-            return Err(Error::setting(
-                "criterion.name",
-                "a criterion without nominal parameters: the robot file states no inertias",
-                "relative-std",
-            ));
-        }
-        Some(name) => name,
-        None if nominal.is_some() => CriterionName::RelativeStd,
-        None => CriterionName::UnitCondition,
+    let noise = match of_logs {
+        Some(noise) => noise,
+        None => noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?,
     };
     let t = &config.trajectory;
     let spacing = config.criterion.correlation_time_s.max(1.0 / t.sample_rate_hz);
-    let mut problem = Problem {
-        criterion: criterion(name, config, &excitation),
+    let problem = Problem {
+        criterion,
         coordinates: joints.clone(),
         limits,
         constraints,
@@ -180,10 +223,8 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         prior: None,
         sign_width: DEFAULT_SIGN_WIDTH,
         samples: DEFAULT_SAMPLES_PER_HARMONIC * t.harmonics,
-        model: Box::new(excitation.clone()),
+        model: Box::new(excitation),
     };
-    let mut files = Vec::new();
-    problem.prior = earlier(config, &problem, &excitation, spacing, &mut files)?;
     Ok(RobotProblem {
         problem,
         model,
@@ -194,7 +235,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         effort_limits,
         assumptions,
         safety,
-        earlier: files,
+        earlier: Vec::new(),
     })
 }
 
@@ -259,9 +300,13 @@ fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64
     }
 }
 
-fn criterion(name: CriterionName, config: &DesignConfig, model: &RobotExcitation) -> Criterion {
+fn criterion(
+    name: CriterionName,
+    config: &DesignConfig,
+    model: &RobotExcitation,
+) -> Result<Criterion, Error> {
     let columns = model.columns();
-    match name {
+    Ok(match name {
         CriterionName::RelativeStd => {
             let size = |k: usize| columns[k].nominal.map_or(0.0, f64::abs);
             let weights = (0..columns.len())
@@ -285,7 +330,11 @@ fn criterion(name: CriterionName, config: &DesignConfig, model: &RobotExcitation
         CriterionName::A => Criterion::raw(Measure::Trace(vec![1.0; columns.len()])),
         CriterionName::D => Criterion::raw(Measure::Determinant),
         CriterionName::E => Criterion::raw(Measure::Smallest),
-    }
+        CriterionName::Intervals => {
+            let expected = "another criterion: `dynid next` designs for intervals that are wanted";
+            return Err(Error::setting("criterion.name", expected, "intervals"));
+        }
+    })
 }
 
 /// Information of earlier trajectories, stacked.

@@ -205,6 +205,9 @@ impl CriterionName {
             CriterionName::A => "root of the mean variance of the base parameters, SI units",
             CriterionName::D => "geometric mean of the axes of the confidence ellipsoid, SI units",
             CriterionName::E => "longest axis of the confidence ellipsoid, SI units",
+            CriterionName::Intervals => {
+                "largest predicted half width of a wanted interval in units of what is wanted (a smooth maximum, a little above it)"
+            }
         }
     }
 
@@ -214,7 +217,7 @@ impl CriterionName {
             CriterionName::RelativeStd | CriterionName::A => (logarithm.exp() / columns as f64).sqrt(),
             CriterionName::UnitCondition | CriterionName::Condition | CriterionName::Mix => logarithm.exp(),
             CriterionName::D => (logarithm / (2.0 * columns as f64)).exp(),
-            CriterionName::E => (0.5 * logarithm).exp(),
+            CriterionName::E | CriterionName::Intervals => (0.5 * logarithm).exp(),
         }
     }
 }

@@ -27,7 +27,7 @@ impl DesignRun {
         crate::fault::page(report::render_design(&self.report_data(config, record)?))
     }
 
-    fn report_data(
+    pub(super) fn report_data(
         &self,
         config: &DesignConfig,
         record: &DesignRecord,
@@ -82,6 +82,7 @@ impl DesignRun {
                 geometric_ratio: Some(r.geometric_ratio),
                 condition: Some(r.condition_number),
             }),
+            intervals: Vec::new(),
             parameters: record
                 .parameters
                 .iter()
@@ -285,11 +286,12 @@ fn criterion_name(name: CriterionName) -> &'static str {
         CriterionName::A => "mean variance (A-optimal)",
         CriterionName::D => "determinant of the information (D-optimal)",
         CriterionName::E => "smallest singular value (E-optimal)",
+        CriterionName::Intervals => "wanted intervals",
     }
 }
 
 /// First letter in capitals, a full stop at the end.
-fn sentence(text: &str) -> String {
+pub(super) fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
 }

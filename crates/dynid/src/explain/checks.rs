@@ -132,8 +132,8 @@ pub(super) fn text(name: Name) -> Text {
             "",
         ),
         Name::TimeBlocks => Text(
-            "Standard deviations come from leaving out one block of time at a time. Few blocks, or blocks shorter than the residuals stay correlated, \
-             make them uncertain or too small.",
+            "Standard deviations come from leaving out one block of time at a time, of fewer than ten blocks from one inflation for all parameters. \
+             Few blocks, or blocks shorter than the residuals stay correlated, make them uncertain or too small.",
             "Record for longer, or several logs.",
             "[conditioning]\nblock_s = 2.0",
         ),

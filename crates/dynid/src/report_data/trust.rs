@@ -96,7 +96,7 @@ impl Shown<'_> {
             blocks: Some(record.blocks as u64),
             block_s: Some(record.block_s),
             wanted_block_s: Some(record.wanted_block_s),
-            robust: self.fitted.jackknife.is_some(),
+            robust: self.fitted.is_robust(),
             whiteness: record
                 .whiteness
                 .iter()

@@ -25,6 +25,7 @@ mod identifiability;
 mod instruments;
 mod least_squares;
 mod mutations;
+mod next;
 mod online;
 mod own_estimator;
 mod own_law;

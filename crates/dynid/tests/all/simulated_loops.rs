@@ -104,17 +104,6 @@ fn a_loop_that_is_not_that_of_the_log_fails() {
             let estimate = id.estimate();
             let check = check_of(&estimate, "instruments");
             println!("{method}, {}: {} {}", gains.replace('\n', " "), check.status.word(), check.meaning);
-            println!(
-                "XX {:?} {:?}",
-                id.simulations.as_ref().unwrap().mismatch,
-                (0..id.fit().x.len())
-                    .map(|k| (
-                        id.model.parameters().linear[id.base.kept[k]].name.clone(),
-                        id.fit().x[k],
-                        id.standard_deviations()[k].0
-                    ))
-                    .collect::<Vec<_>>()
-            );
             assert_eq!(check.status.word(), expected, "{method} {gains}");
             assert!(expected == "ok" || estimate.verdict.status.word() == "fail");
         }

@@ -47,6 +47,29 @@ pub struct DesignParameter {
     pub relative_std_percent: Option<f64>,
 }
 
+/// The 95 % interval of a parameter by the logs so far, and by these and the motion.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct IntervalForecast {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value by the logs so far.
+    pub value: Option<f64>,
+    /// Half width by the logs so far.
+    pub before: Option<f64>,
+    /// Half width that is wanted; `None` for other parameters.
+    pub wanted: Option<f64>,
+    /// Half width that logs and motion are expected to give together.
+    pub after: Option<f64>,
+    /// What comes of what is wanted, e.g. `reached`; empty for other parameters.
+    pub state: String,
+    /// Whether what is wanted will not be there.
+    pub is_missed: bool,
+    /// What there is to say of it.
+    pub note: String,
+}
+
 /// Two parameters whose estimates will be strongly correlated.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ConfoundedPair {

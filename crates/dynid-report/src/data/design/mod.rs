@@ -5,7 +5,9 @@ mod limits;
 mod motion;
 mod starts;
 
-pub use forecast::{ConfoundedPair, DesignParameter, DesignQuality, ParameterShare, RandomMotion};
+pub use forecast::{
+    ConfoundedPair, DesignParameter, DesignQuality, IntervalForecast, ParameterShare, RandomMotion,
+};
 pub use limits::{LimitUse, Obstacle, Shape};
 pub use motion::{DesignJoint, FramePath, JointMotion, Trajectory};
 pub use starts::{DesignStart, Starts};
@@ -128,6 +130,8 @@ pub struct DesignReport {
     pub quality: DesignQuality,
     /// Criterion and condition of random motion within the same limits; `None` if none was found or tried.
     pub random: Option<RandomMotion>,
+    /// Intervals of a motion that is to be recorded beside logs, those that are wanted first; empty for other designs.
+    pub intervals: Vec<IntervalForecast>,
     /// Parameters and how well the log will show them, in the order of the table.
     pub parameters: Vec<DesignParameter>,
     /// Pairs that the log will hardly tell apart, worst first.

@@ -12,7 +12,7 @@ use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
 use super::picture::picture;
-use crate::data::{DesignParameter, DesignQuality, DesignReport, Fact, RandomMotion};
+use crate::data::{DesignParameter, DesignQuality, DesignReport, Fact, IntervalForecast, RandomMotion};
 use crate::error::ReportError;
 
 /// Relative standard deviation above which a parameter is marked, %.
@@ -34,6 +34,9 @@ pub(super) fn context(data: &DesignReport) -> Result<Value, ReportError> {
         comparison => Serde(data.random.as_ref().map(|random| comparison(&data.quality, random))),
         weak => parameters.iter().filter(|p| p.weak).count(),
         weak_percent => WEAK_PERCENT,
+        wanted => Serde(data.intervals.iter().filter(|i| i.wanted.is_some()).map(interval).collect::<Vec<_>>()),
+        others => Serde(data.intervals.iter().filter(|i| i.wanted.is_none()).map(interval).collect::<Vec<_>>()),
+        has_motion => data.trajectory.is_some() || !data.limits.is_empty() || data.intervals.is_empty(),
         parameters => Serde(parameters),
         confounded => Serde(&data.confounded),
         seen_least => Serde(&data.seen_least),
@@ -95,6 +98,21 @@ fn comparison(quality: &DesignQuality, random: &RandomMotion) -> [Comparison; 3]
             designed: quality.condition,
         },
     ]
+}
+
+/// An interval with its half widths in units of what is wanted, of others in units of today's.
+#[derive(Debug, Serialize)]
+struct IntervalView<'a> {
+    #[serde(flatten)]
+    interval: &'a IntervalForecast,
+    before_share: Option<f64>,
+    after_share: Option<f64>,
+}
+
+fn interval(interval: &IntervalForecast) -> IntervalView<'_> {
+    let unit = interval.wanted.or(interval.before);
+    let share = |width: Option<f64>| Some(width? / unit?).filter(|x| x.is_finite());
+    IntervalView { interval, before_share: share(interval.before), after_share: share(interval.after) }
 }
 
 #[derive(Debug, Serialize)]
