@@ -255,7 +255,7 @@ pub fn with_precision(
         .map(|(log, rate_hz, residual)| ResidualSignal { log: *log, rate_hz: *rate_hz, residual })
         .collect();
     let wanted = block_length(&signals, &BlockLengthSettings::default());
-    let duration: f64 = logs.iter().map(PreparedLog::duration).sum();
+    let duration: f64 = logs.iter().map(PreparedLog::distinct).sum();
     let block_s = duration / estimate.blocks.len().max(1) as f64;
     let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
     let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };

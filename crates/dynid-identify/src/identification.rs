@@ -296,15 +296,15 @@ impl Identification {
         out
     }
 
-    /// Length of all training logs, s.
-    pub fn duration_s(&self) -> f64 {
-        self.trained.iter().map(|log| log.duration_s).sum()
+    /// Length of all training logs without what repeats in each, s.
+    pub fn distinct_s(&self) -> f64 {
+        self.trained.iter().map(TrainedLog::distinct_s).sum()
     }
 
-    /// Time that logs lack for as many independent blocks as standard deviations want, s.
+    /// Time of other motion that logs lack for as many independent blocks as standard deviations want, s.
     pub fn lacking_s(&self) -> f64 {
         let wanted = BLOCKS_WANTED * self.fitted.block_length.seconds.max(self.fitted.block_s);
-        Some(wanted - self.duration_s())
+        Some(wanted - self.distinct_s())
             .filter(|lacking| lacking.is_finite())
             .map_or(0.0, |lacking| lacking.max(0.0))
     }

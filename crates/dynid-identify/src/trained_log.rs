@@ -21,6 +21,9 @@ pub struct TrainedLog {
     pub duration_s: f64,
     /// Sample rate, Hz.
     pub rate_hz: f64,
+    /// Time after which the motion repeats, s; absent where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeats_after_s: Option<f64>,
     /// Per output: standard deviation of the noise of the position, rad or m.
     pub position_noise: Vec<f64>,
     /// Per output: standard deviation of the noise of the effort, N m or N.
@@ -42,12 +45,18 @@ impl TrainedLog {
             samples: log.samples(),
             duration_s: log.duration(),
             rate_hz: log.rate_hz,
+            repeats_after_s: log.repeats_after.map(|samples| samples / log.rate_hz),
             position_noise: log.position_noise.iter().map(|noise| noise.sigma).collect(),
             effort_noise: log.effort_noise.iter().map(|noise| noise.sigma).collect(),
             moves: log.moves.clone(),
             velocities: vec![None; log.moves.len()],
             channels: Vec::new(),
         }
+    }
+
+    /// Length without what repeats, s.
+    pub fn distinct_s(&self) -> f64 {
+        self.repeats_after_s.unwrap_or(f64::INFINITY).min(self.duration_s)
     }
 
     pub(crate) fn of(log: &PreparedLog) -> Self {

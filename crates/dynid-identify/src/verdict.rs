@@ -472,6 +472,12 @@ fn blocks(id: &Identification) -> CheckResult {
     let fitted = &id.fitted;
     let wanted = fitted.block_length.seconds;
     let short = wanted > 1.01 * fitted.block_s;
+    let period = id.trained.iter().filter_map(|log| log.repeats_after_s).reduce(f64::min);
+    let repeated = period.map_or_else(String::new, |period| {
+        format!(
+            " (the motion repeats after {period:.1} s, and what the model leaves over comes back with it: blocks are parts of the period)"
+        )
+    });
     check(
         graded(id.blocks() >= 20 && !short, true),
         CheckName::TimeBlocks,
@@ -498,7 +504,7 @@ fn blocks(id: &Identification) -> CheckResult {
                 .to_owned()
         } else {
             "few blocks: the standard deviations are themselves uncertain".to_owned()
-        },
+        } + &repeated,
     )
 }
 

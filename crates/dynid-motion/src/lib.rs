@@ -6,7 +6,7 @@
 //! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
 //! [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
 //! [`trajectory`] holds the excitation trajectories. For motions that repeat:
-//! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics,
+//! [`repetition`] finds after what time, [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics,
 //! [`savitzky_golay`] polynomials over any window.
 //! [`faults`] finds what is wrong with a record. [`live`] forms states of a stream, sample by sample.
 //!
@@ -28,6 +28,7 @@ pub mod log;
 pub mod mask;
 pub mod median;
 pub mod periods;
+pub mod repetition;
 pub mod savitzky_golay;
 pub mod shift;
 pub mod signal;

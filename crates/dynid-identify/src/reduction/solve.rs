@@ -44,7 +44,7 @@ impl Reduction {
         fitting::check_rows(&groups, columns, || self.logs[0].facts.name.clone())?;
         let settings = fitting::linear_settings(&problem.settings);
         let found = estimate(&groups, None, columns, &problem.structure.method, &settings)?;
-        let duration_s = self.logs.iter().map(|log| log.facts.log.duration_s).sum();
+        let duration_s = self.logs.iter().map(|log| log.facts.log.distinct_s()).sum();
         let fitted = Fitted::with_blocks(found, self.recipe.blocks.wanted_s, duration_s);
         progress(Step::Consistency);
         let consistent = consistency::consistent(&problem, &fitted, &groups)?;

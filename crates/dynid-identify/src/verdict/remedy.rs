@@ -5,6 +5,9 @@ use crate::identification::Identification;
 use crate::joint_stiffness;
 use crate::settings::Preflight;
 
+/// Seconds of a designed motion per harmonic: as slow as the usual 5 harmonics of 20 s.
+const SECONDS_PER_HARMONIC: f64 = 4.0;
+
 /// The remedy of a check.
 pub(super) fn of(id: &Identification, check: CheckName) -> String {
     let files = &id.settings.files;
@@ -109,13 +112,15 @@ fn unexplained(id: &Identification) -> &str {
 
 /// A log of the length that blocks want.
 fn longer(id: &Identification) -> String {
-    let (have, lacking) = (id.duration_s(), id.lacking_s());
-    let wanted = have + lacking;
-    match lacking > 0.0 {
-        true => format!(
-            "record {wanted:.0} s in place of {have:.0} s, in one log or several `[[log]]`s (`{}` gives a motion that repeats)",
-            id.settings.files.design() + " --periods 3"
-        ),
-        false => format!("record a longer log of the same kind than {have:.0} s, or add a second `[[log]]`"),
+    let (have, lacking) = (id.distinct_s(), id.lacking_s());
+    if lacking == 0.0 {
+        return format!("record a longer log of the same kind than {have:.0} s, or add a second `[[log]]`");
     }
+    let wanted = (have + lacking).ceil();
+    let harmonics = (wanted / SECONDS_PER_HARMONIC).clamp(5.0, 30.0);
+    format!(
+        "record {wanted:.0} s in place of {have:.0} s, in one log or several `[[log]]`s (`{} --period {wanted:.0} --harmonics {harmonics:.0}` \
+         gives a motion of that length; one that repeats tells no more than its period)",
+        id.settings.files.design()
+    )
 }

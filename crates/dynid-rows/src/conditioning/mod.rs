@@ -32,7 +32,7 @@ pub use dynid_factor::groups::ReducedGroup;
 pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
 pub use friction_shape::{FrictionShape, ShapeKind};
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
-pub use log_rows::{LogRows, least_block_samples, most_blocks, time_blocks};
+pub use log_rows::{LogRows, TimeBlocks, least_block_samples, most_blocks};
 pub use moving::Moving;
 pub use predict::{predict, predict_along};
 pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, prepare};

@@ -82,6 +82,7 @@ impl PreparedLog {
             motion.ddq.push(acceleration.values(self.samples()));
         }
         self.usable = usable;
+        self.repeats_after = (periods > 1).then_some(period_s * self.rate_hz);
         self.periodic = Some(motion);
         Ok(self)
     }

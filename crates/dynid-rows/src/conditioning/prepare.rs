@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use dynid_model::EffortModel;
 use dynid_motion::clock::{self, ClockReport};
+use dynid_motion::repetition::repetition;
 use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_noise};
 use dynid_motion::spikes::{self, SpikeLevel};
 use dynid_motion::{Channel, Log};
@@ -46,6 +47,8 @@ pub struct PreparedLog {
     pub speed_rms: Option<Arc<Vec<Vec<f64>>>>,
     /// What was found about the clock.
     pub clock: ClockReport,
+    /// Time after which the motion repeats, samples, not whole; `None` where it does not.
+    pub repeats_after: Option<f64>,
     /// Motion of a known period, if one was stated; states then come from it.
     pub periodic: Option<PeriodicMotion>,
     /// What was averaged, if the log is the mean of its periods ([`PreparedLog::averaged`]).
@@ -83,6 +86,11 @@ impl PreparedLog {
     /// Duration, s.
     pub fn duration(&self) -> f64 {
         self.samples() as f64 / self.rate_hz
+    }
+
+    /// Duration without what repeats, s.
+    pub fn distinct(&self) -> f64 {
+        self.repeats_after.map_or(f64::INFINITY, |samples| samples / self.rate_hz).min(self.duration())
     }
 }
 
@@ -149,6 +157,7 @@ pub fn prepare(
         moves: Vec::new(),
         speed_rms: None,
         clock: uniform.report,
+        repeats_after: None,
         periodic: None,
         averaged: None,
     };
@@ -161,5 +170,8 @@ pub fn prepare(
         out.position_noise.push(position);
         out.effort_noise.push(effort);
     }
+    let moving = out.position.iter().zip(&out.moves).filter(|(_, moves)| **moves);
+    let moving: Vec<&[f64]> = moving.map(|(position, _)| position.as_slice()).collect();
+    out.repeats_after = repetition(&moving, rate_hz);
     Ok(out)
 }

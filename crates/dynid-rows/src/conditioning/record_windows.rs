@@ -138,6 +138,7 @@ impl PreparedLog {
             spike_levels: figures.spikes.clone(),
             speed_rms: Some(figures.speed_rms.clone()),
             clock: figures.clock.clone(),
+            repeats_after: None,
             periodic: None,
             averaged: None,
         })
