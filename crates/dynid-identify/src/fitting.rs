@@ -9,7 +9,9 @@ use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whi
 use dynid_factor::Factor;
 use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_linalg::Mat;
-use dynid_rows::conditioning::{Conditioning, LogRows, PreparedLog, ReducedGroup, textbook_rows};
+use dynid_rows::conditioning::{
+    Conditioning, LogRows, PreparedLog, ReducedGroup, first_of_motion, textbook_rows,
+};
 
 use crate::Error;
 use crate::agreement::Agreement;
@@ -255,7 +257,10 @@ pub fn with_precision(
         .map(|(log, rate_hz, residual)| ResidualSignal { log: *log, rate_hz: *rate_hz, residual })
         .collect();
     let wanted = block_length(&signals, &BlockLengthSettings::default());
-    let duration: f64 = logs.iter().map(PreparedLog::distinct).sum();
+    let first = first_of_motion(logs);
+    let estimate = estimate.with_shared_motions(&first);
+    let duration: f64 =
+        logs.iter().enumerate().filter(|(k, _)| first[*k] == *k).map(|(_, log)| log.distinct()).sum();
     let block_s = duration / estimate.blocks.len().max(1) as f64;
     let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
     let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };

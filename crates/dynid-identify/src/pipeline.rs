@@ -18,7 +18,7 @@ use dynid_estimate::identifiability::VisibleSpace;
 use dynid_linalg::Mat;
 use dynid_model::element::scale_name;
 use dynid_model::{EffortModel, RobotModel};
-use dynid_rows::conditioning::{PreparedLog, ReducedGroup};
+use dynid_rows::conditioning::{PreparedLog, ReducedGroup, tell_shared_motions};
 
 use crate::caution::{self, Caution};
 use crate::check::CheckName;
@@ -144,7 +144,7 @@ fn run(
         Caution::warn(caution::LOG, message, remedy)
     });
     let reading = reading.collect();
-    let training = problem.logs.iter().map(TrainedLog::of).collect();
+    let training = TrainedLog::of_all(&problem.logs);
     let sources = read.into_iter().map(|log| log.source).collect();
     let beside = Beside { training, sources, findings, overlaps, own_delays, warnings, reading, comparison };
     let (mut out, left) = assemble(problem, fit, beside)?;
@@ -521,6 +521,7 @@ pub fn open(
         let warnings = nearest.into_iter().chain(log.warnings()).collect();
         read.push(ReadLog { warnings, source: log.source });
     }
+    tell_shared_motions(&mut prepared);
     for log in &prepared {
         settings.check_cutoffs(&log.name, log.rate_hz)?;
     }

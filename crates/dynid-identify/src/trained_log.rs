@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dynid_rows::conditioning::PreparedLog;
+use dynid_rows::conditioning::{PreparedLog, first_of_motion};
 use serde::{Deserialize, Serialize};
 
 use crate::agreement::FitValues;
@@ -24,6 +24,9 @@ pub struct TrainedLog {
     /// Time after which the motion repeats, s; absent where it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repeats_after_s: Option<f64>,
+    /// Log before it whose motion it repeats; absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub same_motion_as: Option<String>,
     /// Per output: standard deviation of the noise of the position, rad or m.
     pub position_noise: Vec<f64>,
     /// Per output: standard deviation of the noise of the effort, N m or N.
@@ -45,6 +48,7 @@ impl TrainedLog {
             samples: log.samples(),
             duration_s: log.duration(),
             rate_hz: log.rate_hz,
+            same_motion_as: None,
             repeats_after_s: log.repeats_after.map(|samples| samples / log.rate_hz),
             position_noise: log.position_noise.iter().map(|noise| noise.sigma).collect(),
             effort_noise: log.effort_noise.iter().map(|noise| noise.sigma).collect(),
@@ -54,8 +58,20 @@ impl TrainedLog {
         }
     }
 
-    /// Length without what repeats, s.
+    /// All training logs.
+    pub(crate) fn of_all(logs: &[PreparedLog]) -> Vec<Self> {
+        let mut out: Vec<Self> = logs.iter().map(TrainedLog::of).collect();
+        for (k, first) in first_of_motion(logs).into_iter().enumerate().filter(|(k, first)| k != first) {
+            out[k].same_motion_as = Some(out[first].name.clone());
+        }
+        out
+    }
+
+    /// Length without what repeats, in itself or an earlier log, s.
     pub fn distinct_s(&self) -> f64 {
+        if self.same_motion_as.is_some() {
+            return 0.0;
+        }
         self.repeats_after_s.unwrap_or(f64::INFINITY).min(self.duration_s)
     }
 

@@ -473,11 +473,16 @@ fn blocks(id: &Identification) -> CheckResult {
     let wanted = fitted.block_length.seconds;
     let short = wanted > 1.01 * fitted.block_s;
     let period = id.trained.iter().filter_map(|log| log.repeats_after_s).reduce(f64::min);
-    let repeated = period.map_or_else(String::new, |period| {
-        format!(
+    let repeated = match (period, id.trained.iter().any(|log| log.same_motion_as.is_some())) {
+        (Some(period), _) => format!(
             " (the motion repeats after {period:.1} s, and what the model leaves over comes back with it: blocks are parts of the period)"
-        )
-    });
+        ),
+        (None, true) => {
+            " (logs repeat the motion of others, and what the model leaves over comes back with it: they have their blocks together)"
+                .to_owned()
+        }
+        (None, false) => String::new(),
+    };
     check(
         graded(id.blocks() >= 20 && !short, true),
         CheckName::TimeBlocks,

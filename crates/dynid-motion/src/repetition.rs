@@ -20,6 +20,8 @@ const ELSEWHERE: f64 = 0.3;
 const OVERLAP: f64 = 0.2;
 /// Where samples agree positions must spread by this share of what they do over the record: rest agrees with rest.
 const SPREAD: f64 = 0.3;
+/// Means and spreads of the same motion differ by at most this, in spreads.
+const LIKE: f64 = 0.25;
 /// Lags that are looked at closely.
 const CANDIDATES: usize = 12;
 /// Samples of a close look.
@@ -63,6 +65,74 @@ pub fn repetition(positions: &[&[f64]], rate_hz: f64) -> Option<f64> {
         lag += stretch;
     }
     None
+}
+
+/// By how many samples a motion lies behind another one of the same sample rate that it repeats: `b(t) = a(t + lag)`. `None` if it is another
+/// motion: positions must agree as [`repetition`] says, at 60 % of the samples of `b` or more.
+///
+/// `a`, `b`: per joint, in the same order.
+pub fn repeated_from(a: &[&[f64]], b: &[&[f64]], rate_hz: f64) -> Option<isize> {
+    let (of_a, of_b) = (a.first()?.len(), b.first()?.len());
+    let spreads: Vec<f64> = a.iter().map(|q| deviation(q)).collect();
+    if a.len() != b.len() || of_a.min(of_b) < COARSE.0 || spreads.iter().any(|s| !(*s > 0.0 && s.is_finite()))
+    {
+        return None;
+    }
+    let mean = |q: &[f64]| q.iter().sum::<f64>() / q.len() as f64;
+    let alike = |((a, b), spread): ((&&[f64], &&[f64]), &f64)| {
+        (deviation(b) / spread - 1.0).abs() < LIKE && (mean(a) - mean(b)).abs() < LIKE * spread
+    };
+    if !a.iter().zip(b).zip(&spreads).all(alike) {
+        return None;
+    }
+    let wanted = (of_a.max(of_b) as f64 / rate_hz * COARSE_HZ).ceil() as usize;
+    let step = of_a.max(of_b).div_ceil(wanted.clamp(COARSE.0, COARSE.1)).max(1);
+    let coarse = |signals: &[&[f64]]| -> Vec<Vec<f64>> {
+        let of = |(q, spread): (&&[f64], &f64)| q.iter().step_by(step).map(|x| x / spread).collect();
+        signals.iter().zip(&spreads).map(of).collect()
+    };
+    let (x, y) = (coarse(a), coarse(b));
+    let (n, m) = (x[0].len() as isize, y[0].len() as isize);
+    let least = (SHARE * m as f64) as isize;
+    let agreeing = |lag: isize| {
+        let range = (-lag).max(0)..(n - lag).min(m);
+        range
+            .filter(|t| {
+                x.iter().zip(&y).all(|(x, y)| (x[(t + lag) as usize] - y[*t as usize]).abs() <= ALIKE.0)
+            })
+            .count()
+    };
+    let lags: Vec<isize> = (least - m..=n - least).collect();
+    let counts: Vec<usize> = lags.iter().map(|lag| agreeing(*lag)).collect();
+    let most = *counts.iter().max()?;
+    if (most as f64) < SHARE * m as f64 {
+        return None;
+    }
+    // Several lags may be as good by coarse samples.
+    let first = counts.iter().position(|count| *count == most)?;
+    let alike = counts[first..].iter().take_while(|count| **count == most).count();
+    let (lag, room) = (lags[first + alike / 2], alike as isize / 2 + 2);
+    let step = step as isize;
+    let overlap = |lag: isize| (-lag).max(0)..(of_a as isize - lag).min(of_b as isize);
+    let off = |lag: isize, t: isize| {
+        let of =
+            |((a, b), s): ((&&[f64], &&[f64]), &f64)| ((a[(t + lag) as usize] - b[t as usize]) / s).abs();
+        a.iter().zip(b).zip(&spreads).map(of).fold(0.0, f64::max)
+    };
+    let misfit = |lag: &isize| {
+        let range = overlap(*lag);
+        let stride = (range.len() / CLOSE).max(1);
+        let (count, range) = (range.len().div_ceil(stride).max(1), range.step_by(stride));
+        range.map(|t| (off(*lag, t) / ALIKE.1).powi(2).min(1.0)).sum::<f64>() / count as f64
+    };
+    let close = ((lag - room) * step..=(lag + room) * step).filter(|lag| !overlap(*lag).is_empty());
+    let lag = close.min_by(|p, q| misfit(p).total_cmp(&misfit(q)))?;
+    let same: Vec<isize> = overlap(lag).filter(|t| off(lag, *t) <= ALIKE.1).collect();
+    let moves = |(b, spread): (&&[f64], &f64)| {
+        let there: Vec<f64> = same.iter().map(|t| b[*t as usize]).collect();
+        deviation(&there) >= SPREAD * spread
+    };
+    (same.len() as f64 >= SHARE * of_b as f64 && b.iter().zip(&spreads).all(moves)).then_some(lag)
 }
 
 fn deviation(signal: &[f64]) -> f64 {
@@ -159,6 +229,22 @@ mod tests {
         assert_eq!(found(&motion(20.0, 20.0, 0.0).each_ref().map(still)), None);
         let ramp = [0.3, 0.5].map(|v| (0..8000).map(|k| v * f64::from(k)).collect());
         assert_eq!(found(&ramp), None);
+    }
+
+    #[test]
+    fn the_same_motion_in_two_records_is_found_with_its_lag() {
+        let slices = |signals: &[Vec<f64>; 2]| signals.each_ref().map(|q| q.clone());
+        let [first, again] = [1e-3, 2e-3].map(|noise| slices(&motion(20.0, 20.0, noise)));
+        let of = |a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]| {
+            repeated_from(&a.each_ref().map(Vec::as_slice), &b.each_ref().map(Vec::as_slice), RATE_HZ)
+        };
+        assert_eq!(of(&first, &again), Some(0));
+        let later = again.each_ref().map(|q| q[300..].to_vec());
+        assert_eq!(of(&first, &later), Some(300));
+        assert_eq!(of(&later, &first), Some(-300));
+        assert_eq!(of(&first, &motion(21.0, 20.0, 1e-3)), None);
+        let other = [first[1].clone(), first[0].clone()];
+        assert_eq!(of(&first, &other), None);
     }
 
     #[test]

@@ -115,6 +115,7 @@ fn squared(
         prior,
         loss: None,
         given_blocks: Vec::new(),
+        first_of_motion: Vec::new(),
         paired: Vec::new(),
     }
 }
@@ -171,6 +172,7 @@ fn by_own(
         prior: None,
         loss: None,
         given_blocks: Vec::new(),
+        first_of_motion: Vec::new(),
         paired: Vec::new(),
     })
 }
@@ -320,6 +322,7 @@ pub(crate) fn assemble(
         prior: None,
         loss: None,
         given_blocks: Vec::new(),
+        first_of_motion: Vec::new(),
         paired: Vec::new(),
     }
 }

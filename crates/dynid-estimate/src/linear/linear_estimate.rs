@@ -68,6 +68,8 @@ pub struct LinearEstimate {
     pub converged: bool,
     /// Loss `Σ ρ(r/ŝ)` at the start of every pass with frozen scales; empty without a robust loss.
     pub losses: Vec<f64>,
+    /// Per log the one whose time blocks its own belong to; empty: each has blocks of its own.
+    pub(super) first_of_motion: Vec<usize>,
     pub(super) prior: Option<Factor>,
     pub(super) loss: Option<Loss>,
     /// Time blocks as given, for total least squares solved again without a block; else none.
@@ -88,7 +90,7 @@ impl LinearEstimate {
         let total = self.x.len();
         let weights = self.weights();
         self.reduced = self.reduced.iter().map(|g| g.coarsened(factor)).collect();
-        self.blocks = time_blocks(&self.reduced, &weights, total);
+        self.blocks = self.time_blocks(&self.reduced, &weights, total);
         self.paired = self.paired.iter().map(|g| g.coarsened(factor)).collect();
         if !self.given_blocks.is_empty() {
             // Unweighted, as they were given.
@@ -97,6 +99,29 @@ impl LinearEstimate {
             self.given_blocks = merged.collect();
         }
         self
+    }
+
+    /// Returns the estimate with the time blocks of logs that share a motion put together, block by block: what a model leaves over at a
+    /// place and speed comes back with the motion.
+    ///
+    /// `first_of_motion`: per log the first one that holds its motion, which may be itself. Panics unless there is one for every log.
+    #[must_use]
+    pub fn with_shared_motions(mut self, first_of_motion: &[usize]) -> LinearEstimate {
+        if first_of_motion.iter().enumerate().all(|(k, first)| k == *first) {
+            return self;
+        }
+        self.first_of_motion = first_of_motion.to_vec();
+        let weights = self.weights();
+        self.blocks = self.time_blocks(&self.reduced, &weights, self.x.len());
+        self
+    }
+
+    fn time_blocks(&self, groups: &[ReducedGroup], weights: &[f64], total: usize) -> Vec<Factor> {
+        if self.first_of_motion.is_empty() {
+            return time_blocks(groups, weights, total);
+        }
+        let of_motion = |g: &ReducedGroup| ReducedGroup { log: self.first_of_motion[g.log], ..g.clone() };
+        time_blocks(&groups.iter().map(of_motion).collect::<Vec<_>>(), weights, total)
     }
 
     /// Parameters of the kept columns.
@@ -171,7 +196,7 @@ impl LinearEstimate {
         if !self.paired.is_empty() {
             let total = self.x.len();
             let columns = paired_columns(&self.solution.kept, total);
-            let blocks = time_blocks(&self.paired, &self.weights(), 2 * total);
+            let blocks = self.time_blocks(&self.paired, &self.weights(), 2 * total);
             let kept: Vec<Factor> = blocks.iter().map(|b| b.select(&columns)).collect();
             return instrumental_jackknife(&kept, &self.kept_x());
         }

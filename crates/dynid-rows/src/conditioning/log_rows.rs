@@ -33,6 +33,8 @@ pub struct TimeBlocks {
     length: f64,
     /// Period of a motion that repeats, samples.
     period: Option<f64>,
+    /// Samples by which the log lies behind the one whose blocks these are.
+    lag: f64,
 }
 
 impl TimeBlocks {
@@ -40,33 +42,41 @@ impl TimeBlocks {
     pub fn of(log: &PreparedLog, kernel_hz: f64, logs: usize, settings: &ConditioningSettings) -> Self {
         let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
         let least = least_block_samples(kernel_hz, log.rate_hz, settings);
-        match log.repeats_after {
+        // Logs that share a motion have the blocks of the first one.
+        let (samples, repeats_after, lag) = match log.shared {
+            Some(shared) => (shared.samples, shared.repeats_after, shared.lag),
+            None => (log.samples(), log.repeats_after, 0.0),
+        };
+        let blocks = match repeats_after {
             Some(period) => TimeBlocks::of_period(period, least, most),
-            None => TimeBlocks::in_time(log, kernel_hz, logs, settings),
-        }
+            None => TimeBlocks::of_samples(samples, least, most),
+        };
+        TimeBlocks { lag, ..blocks }
     }
 
     /// Time blocks of one of so many logs whether or not its motion repeats.
     fn in_time(log: &PreparedLog, kernel_hz: f64, logs: usize, settings: &ConditioningSettings) -> Self {
         let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
         let least = least_block_samples(kernel_hz, log.rate_hz, settings);
-        let length = least.max(log.samples().div_ceil(most));
-        let count = (log.samples() / length).max(1);
-        TimeBlocks { count, length: length as f64, period: None }
+        TimeBlocks::of_samples(log.samples(), least, most)
+    }
+
+    fn of_samples(samples: usize, least: usize, most: usize) -> Self {
+        let length = least.max(samples.div_ceil(most));
+        let count = (samples / length).max(1);
+        TimeBlocks { count, length: length as f64, period: None, lag: 0.0 }
     }
 
     /// Parts of a period, at least two where there may be so many: `least`, samples, is the length that they want; `most`: so many at most.
     pub fn of_period(period: f64, least: usize, most: usize) -> Self {
         let count = ((period / least as f64) as usize).max(2).min(most.max(1));
-        TimeBlocks { count, length: period / count as f64, period: Some(period) }
+        TimeBlocks { count, length: period / count as f64, period: Some(period), lag: 0.0 }
     }
 
     /// The block of a sample.
     pub fn block(&self, sample: usize) -> usize {
-        let at = match self.period {
-            Some(period) => sample as f64 % period,
-            None => sample as f64,
-        };
+        let at = sample as f64 + self.lag;
+        let at = self.period.map_or(at.max(0.0), |period| at.rem_euclid(period));
         ((at / self.length) as usize).min(self.count - 1)
     }
 }

@@ -35,7 +35,9 @@ pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::{LogRows, TimeBlocks, least_block_samples, most_blocks};
 pub use moving::Moving;
 pub use predict::{predict, predict_along};
-pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, prepare};
+pub use prepare::{
+    PeriodicMotion, PeriodsAveraged, PreparedLog, SharedMotion, first_of_motion, prepare, tell_shared_motions,
+};
 pub use record_windows::{RecordFigures, Window};
 pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;

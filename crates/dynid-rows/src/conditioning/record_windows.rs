@@ -139,6 +139,7 @@ impl PreparedLog {
             speed_rms: Some(figures.speed_rms.clone()),
             clock: figures.clock.clone(),
             repeats_after: None,
+            shared: None,
             periodic: None,
             averaged: None,
         })

@@ -80,7 +80,7 @@ impl PreparedLog {
         let whole = &self.usable[..periods * period];
         self.usable = (0..period).map(|k| whole[k..].iter().step_by(period).all(|u| *u)).collect();
         self.averaged = Some(means);
-        self.repeats_after = None;
+        (self.repeats_after, self.shared) = (None, None);
         Ok(self)
     }
 }
