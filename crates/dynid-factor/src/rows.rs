@@ -33,7 +33,7 @@ pub struct GroupShape {
 /// A run of rows of one group inside one time block.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a> {
-    /// Time block. Of a motion that repeats it is a part of the period, which comes again.
+    /// Time block, never below that of the run before.
     pub block: usize,
     /// Sample of the log at which each row is centred, ascending within a group.
     pub samples: &'a [usize],
@@ -102,25 +102,18 @@ pub fn visit_all<V: RowVisitor>(source: &dyn RowSource, visitors: &mut [V]) -> R
 /// Reduces the rows of one group to one factor per time block, weighted or not.
 pub struct BlockReducer {
     builder: FactorBuilder,
-    /// The block at hand.
-    block: usize,
-    /// Factors of the others; `None` of blocks without rows so far.
-    done: Vec<Option<Factor>>,
+    done: Vec<Factor>,
 }
 
 impl BlockReducer {
     /// Reducer of rows with so many columns.
     pub fn new(columns: usize) -> Self {
-        BlockReducer {
-            builder: FactorBuilder::with_chunk_rows(columns, CHUNK_ROWS),
-            block: 0,
-            done: Vec::new(),
-        }
+        BlockReducer { builder: FactorBuilder::with_chunk_rows(columns, CHUNK_ROWS), done: Vec::new() }
     }
 
     /// Appends rows, each multiplied by its root weight.
     pub fn push(&mut self, rows: &Rows<'_>, root_weights: Option<&[f64]>) -> Result<(), FactorError> {
-        self.turn_to(rows.block);
+        self.finish_until(rows.block);
         let columns = self.builder.columns();
         self.builder.push_with(rows.effort.len(), |column, range, out| {
             let source = if column < columns { &rows.regressor[column * rows.stride..] } else { rows.effort };
@@ -133,56 +126,38 @@ impl BlockReducer {
         })
     }
 
-    fn turn_to(&mut self, block: usize) {
-        if block == self.block {
-            return;
-        }
-        let left = self.builder.take();
-        self.done.resize(self.done.len().max(self.block + 1), None);
-        self.done[self.block] = Some(left);
-        self.block = block;
-        // A block that comes again goes on where it was.
-        if let Some(earlier) = self.done.get_mut(block).and_then(Option::take) {
-            self.builder.push_factor(&earlier);
+    fn finish_until(&mut self, block: usize) {
+        while self.done.len() < block {
+            self.done.push(self.builder.take());
         }
     }
 
     /// Merges time blocks in pairs, the one at hand too: block `b` is `b / 2` from here on.
     pub fn pair(&mut self) {
-        if let Some(partner) = self.done.get_mut(self.block ^ 1).and_then(Option::take) {
-            self.builder.push_factor(&partner);
+        if !self.done.len().is_multiple_of(2)
+            && let Some(last) = self.done.pop()
+        {
+            self.builder.push_factor(&last);
         }
-        self.block /= 2;
-        let merged = |pair: &[Option<Factor>]| {
-            let parts: Vec<&Factor> = pair.iter().flatten().collect();
-            (!parts.is_empty()).then(|| Factor::merge(&parts))
-        };
-        self.done = self.done.chunks(2).map(merged).collect();
+        self.done = self.done.chunks(2).map(|pair| Factor::merge(&pair.iter().collect::<Vec<_>>())).collect();
     }
 
     /// Factors of all time blocks of a group; blocks without rows are empty, and rows behind the last one belong to it.
     #[must_use]
     pub fn finish(mut self, shape: &GroupShape) -> ReducedGroup {
-        let columns = self.builder.columns();
-        if self.block >= shape.blocks && self.builder.rows() > 0 {
-            self.turn_to_last(shape.blocks);
+        if self.done.len() == shape.blocks
+            && self.builder.rows() > 0
+            && let Some(last) = self.done.pop()
+        {
+            self.builder.push_factor(&last);
         }
-        self.turn_to(usize::MAX);
-        self.done.resize(shape.blocks, None);
+        self.finish_until(shape.blocks);
         ReducedGroup {
             log: shape.log,
             output: shape.output,
             scale: shape.scale,
             columns: shape.columns.clone(),
-            blocks: self.done.into_iter().map(|f| f.unwrap_or_else(|| Factor::empty(columns))).collect(),
-        }
-    }
-
-    /// Lets the block at hand, which lies behind the last one, be that.
-    fn turn_to_last(&mut self, blocks: usize) {
-        self.block = blocks.saturating_sub(1);
-        if let Some(earlier) = self.done.get_mut(self.block).and_then(Option::take) {
-            self.builder.push_factor(&earlier);
+            blocks: self.done,
         }
     }
 }

@@ -111,7 +111,7 @@ pub(crate) fn consistent(
     let problem = |factor: &Factor| problem(model, regrouping, factor, prior, bounds);
     let trials: Vec<f64> = match estimator.prior_weight {
         Some(weight) => vec![weight],
-        None => LADDER.iter().map(|share| share * fitted.inflation).collect(),
+        None => LADDER.iter().map(|share| share * fitted.inflation_in_time).collect(),
     };
     let settings: Vec<bodies::Settings> = trials
         .iter()

@@ -10,13 +10,14 @@ use dynid_factor::Factor;
 use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_linalg::Mat;
 use dynid_rows::conditioning::{
-    Conditioning, LogRows, PreparedLog, ReducedGroup, first_of_motion, textbook_rows,
+    Conditioning, LogMotion, LogRows, PreparedLog, ReducedGroup, motions, parts_of_motions, textbook_rows,
 };
 
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::problem::Problem;
 use crate::settings::{Settings, Variances};
+use crate::trained_log::TrainedLog;
 
 /// Joints whose variance inflation differs by more than this are deflated one by one.
 const UNEQUAL: f64 = 2.0;
@@ -37,6 +38,8 @@ pub struct Fitted {
     pub inflated: Option<Mat>,
     /// Variance inflation `κ`: by how much coloured residuals inflate the variances that white ones would give.
     pub inflation: f64,
+    /// The same from blocks of time alone, whether or not motions repeat: what held-out blocks of time differ by.
+    pub inflation_in_time: f64,
     /// Variance inflation joint by joint, where it can be told.
     pub inflation_per_output: Vec<Option<f64>>,
     /// Length of time blocks that the residuals ask for.
@@ -234,6 +237,15 @@ impl RowResiduals {
     }
 }
 
+/// Per log the number of its time blocks.
+fn blocks_of_logs(estimate: &LinearEstimate, logs: usize) -> Vec<usize> {
+    let mut blocks = vec![0; logs];
+    for group in &estimate.reduced {
+        blocks[group.log] = blocks[group.log].max(group.blocks.len());
+    }
+    blocks
+}
+
 /// Covariance from time blocks that are long enough for the residuals found.
 ///
 /// Blocks are merged until they are five correlation times long, but never to fewer than [`MIN_BLOCKS`]; `fixed`: they stay
@@ -257,19 +269,53 @@ pub fn with_precision(
         .map(|(log, rate_hz, residual)| ResidualSignal { log: *log, rate_hz: *rate_hz, residual })
         .collect();
     let wanted = block_length(&signals, &BlockLengthSettings::default());
-    let first = first_of_motion(logs);
-    let estimate = estimate.with_shared_motions(&first);
-    let duration: f64 =
-        logs.iter().enumerate().filter(|(k, _)| first[*k] == *k).map(|(_, log)| log.distinct()).sum();
+    let duration: f64 = logs.iter().map(PreparedLog::duration).sum();
     let block_s = duration / estimate.blocks.len().max(1) as f64;
     let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
     let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };
-    Fitted::of(estimate.with_longer_blocks(factor), wanted, block_s * factor as f64, factor)
+    let motions = motions(logs);
+    let blocks = blocks_of_logs(&estimate, logs.len());
+    // A period stays a whole number of blocks.
+    let divides = |factor: &usize| {
+        motions
+            .iter()
+            .zip(&blocks)
+            .all(|(m, blocks)| m.repeats_after.is_none() || m.parts(*blocks).0 % factor == 0)
+    };
+    let factor = (1..=factor).rev().find(divides).unwrap_or(1);
+    Fitted::of(estimate.with_longer_blocks(factor), wanted, block_s * factor as f64, factor, &motions)
 }
 
 impl Fitted {
-    fn of(estimate: LinearEstimate, wanted: BlockLength, block_s: f64, merged_blocks: usize) -> Self {
+    fn of(
+        estimate: LinearEstimate,
+        wanted: BlockLength,
+        block_s: f64,
+        merged_blocks: usize,
+        motions: &[LogMotion],
+    ) -> Self {
         let white = estimate.model_covariance();
+        let blocks = blocks_of_logs(&estimate, motions.len());
+        let parts = parts_of_motions(motions, &blocks);
+        let mut different: Vec<usize> = parts.concat();
+        different.sort_unstable();
+        different.dedup();
+        if different.len() == blocks.iter().sum::<usize>() {
+            return Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
+        }
+        let in_time = Self::of_blocks(estimate, white.clone(), wanted.clone(), block_s, merged_blocks);
+        let estimate = in_time.estimate.with_repeated_motions(parts);
+        let fitted = Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
+        Fitted { inflation_in_time: in_time.inflation, ..fitted }
+    }
+
+    fn of_blocks(
+        estimate: LinearEstimate,
+        white: Mat,
+        wanted: BlockLength,
+        block_s: f64,
+        merged_blocks: usize,
+    ) -> Self {
         let jackknife = (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten();
         let jackknife = jackknife.map(|j| j.covariance);
         let by_scores = match jackknife {
@@ -284,6 +330,7 @@ impl Fitted {
             white,
             jackknife,
             inflation,
+            inflation_in_time: inflation,
             inflation_per_output: per_output,
             block_length: wanted,
             block_s,
@@ -293,7 +340,8 @@ impl Fitted {
     }
 
     /// Covariance from time blocks as they are, of logs of a total length; `wanted_s`: the length that residuals ask for.
-    pub(crate) fn with_blocks(estimate: LinearEstimate, wanted_s: f64, duration_s: f64) -> Self {
+    pub(crate) fn with_blocks(estimate: LinearEstimate, wanted_s: f64, logs: &[&TrainedLog]) -> Self {
+        let duration_s: f64 = logs.iter().map(|log| log.duration_s).sum();
         let blocks = estimate.blocks.len();
         let wanted = BlockLength {
             seconds: wanted_s,
@@ -302,7 +350,14 @@ impl Fitted {
             worst: None,
             status: if blocks >= MIN_BLOCKS { BlockLengthStatus::Enough } else { BlockLengthStatus::Few },
         };
-        Fitted::of(estimate, wanted, duration_s / blocks.max(1) as f64, 1)
+        let motion = |(k, log): (usize, &&TrainedLog)| LogMotion {
+            length: log.duration_s,
+            repeats_after: log.repeats_after_s,
+            first: k,
+            lag: 0.0,
+        };
+        let motions: Vec<LogMotion> = logs.iter().enumerate().map(motion).collect();
+        Fitted::of(estimate, wanted, duration_s / blocks.max(1) as f64, 1, &motions)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dynid_rows::conditioning::{PreparedLog, first_of_motion};
+use dynid_rows::conditioning::{PreparedLog, motions};
 use serde::{Deserialize, Serialize};
 
 use crate::agreement::FitValues;
@@ -61,8 +61,8 @@ impl TrainedLog {
     /// All training logs.
     pub(crate) fn of_all(logs: &[PreparedLog]) -> Vec<Self> {
         let mut out: Vec<Self> = logs.iter().map(TrainedLog::of).collect();
-        for (k, first) in first_of_motion(logs).into_iter().enumerate().filter(|(k, first)| k != first) {
-            out[k].same_motion_as = Some(out[first].name.clone());
+        for (k, motion) in motions(logs).into_iter().enumerate().filter(|(k, motion)| *k != motion.first) {
+            out[k].same_motion_as = Some(out[motion.first].name.clone());
         }
         out
     }

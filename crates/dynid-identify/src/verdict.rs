@@ -475,10 +475,10 @@ fn blocks(id: &Identification) -> CheckResult {
     let period = id.trained.iter().filter_map(|log| log.repeats_after_s).reduce(f64::min);
     let repeated = match (period, id.trained.iter().any(|log| log.same_motion_as.is_some())) {
         (Some(period), _) => format!(
-            " (the motion repeats after {period:.1} s, and what the model leaves over comes back with it: blocks are parts of the period)"
+            " (the motion repeats after {period:.1} s, and what the model leaves over comes back with it: blocks of the same part of the period count as one)"
         ),
         (None, true) => {
-            " (logs repeat the motion of others, and what the model leaves over comes back with it: they have their blocks together)"
+            " (logs repeat the motion of others, and what the model leaves over comes back with it: blocks of the same part of it count as one)"
                 .to_owned()
         }
         (None, false) => String::new(),

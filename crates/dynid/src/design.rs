@@ -54,12 +54,12 @@ pub enum DesignStep {
         /// Best criterion so far, if any start met all limits.
         best: Option<f64>,
     },
-    /// Looking for the shortest motion: what was found for a period.
+    /// Looking for the shortest motion: what was found at a speed.
     Length {
-        /// Period, s.
-        period_s: f64,
-        /// Periods after which all wanted intervals are reached; `None`: not within a thousand times the longest record.
-        periods: Option<usize>,
+        /// Highest frequency of the motion, Hz.
+        highest_hz: f64,
+        /// Time after which it reaches all that is wanted, s; `None`: not within ten thousand times its own.
+        needed_s: Option<f64>,
     },
     /// Predicting what the log will tell.
     Forecast,
@@ -72,11 +72,11 @@ impl fmt::Display for DesignStep {
             DesignStep::Structure => f.write_str("finding base parameters"),
             DesignStep::Starts { best: Some(best), .. } => write!(f, "starts, best {best:.4}"),
             DesignStep::Starts { best: None, .. } => f.write_str("starts, none within all limits yet"),
-            DesignStep::Length { period_s, periods: Some(periods) } => {
-                write!(f, "periods of {period_s} s: {periods} needed")
+            DesignStep::Length { highest_hz, needed_s: Some(needed_s) } => {
+                write!(f, "motion up to {highest_hz:.2} Hz: {needed_s:.1} s needed")
             }
-            DesignStep::Length { period_s, periods: None } => {
-                write!(f, "periods of {period_s} s: the longest record is too short")
+            DesignStep::Length { highest_hz, needed_s: None } => {
+                write!(f, "motion up to {highest_hz:.2} Hz: no length is enough")
             }
             DesignStep::Forecast => f.write_str("predicting what the log will tell"),
         }

@@ -141,9 +141,9 @@ pub(crate) struct NextArgs {
     #[arg(long, required = true, value_name = "NAME=WIDTH", value_parser = str::parse::<Wanted>)]
     pub(crate) want: Vec<Wanted>,
     /// Longest record, s.
-    #[arg(long, value_name = "S", default_value_t = 300.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 120.0, allow_negative_numbers = true)]
     pub(crate) longest: f64,
-    /// Longest period that is tried, beside its half and its quarter, s (default: 20).
+    /// Time that as many harmonics as `--harmonics` take in the slowest motion that is tried, s (default: 20).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) period: Option<f64>,
     /// Output folder (default: dynid-next).

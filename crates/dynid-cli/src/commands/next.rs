@@ -78,11 +78,11 @@ fn summary(record: &NextRecord) -> String {
         out.extend(p.combination.iter().map(|seen| format!("{}: {seen}", p.name)));
     }
     if !record.tried.is_empty() {
-        let tried = record.tried.iter().map(|t| match t.seconds {
-            Some(seconds) => format!("{} s with periods of {} s", table::number(Some(seconds)), t.period_s),
-            None => format!("far too long with periods of {} s", t.period_s),
+        let tried = record.tried.iter().map(|t| match t.needed_s {
+            Some(needed) => format!("{needed:.1} s up to {} Hz", table::number(Some(t.highest_hz))),
+            None => format!("no length up to {} Hz", table::number(Some(t.highest_hz))),
         });
-        out.push(format!("\ntime needed: {}", tried.collect::<Vec<_>>().join(", ")));
+        out.push(format!("\ntime needed by speed of motion: {}", tried.collect::<Vec<_>>().join(", ")));
     }
     out.push(format!("\n{}: {}\n", record.verdict.status, record.verdict.headline));
     out.join("\n")

@@ -115,7 +115,7 @@ fn squared(
         prior,
         loss: None,
         given_blocks: Vec::new(),
-        first_of_motion: Vec::new(),
+        parts: Vec::new(),
         paired: Vec::new(),
     }
 }
@@ -172,7 +172,7 @@ fn by_own(
         prior: None,
         loss: None,
         given_blocks: Vec::new(),
-        first_of_motion: Vec::new(),
+        parts: Vec::new(),
         paired: Vec::new(),
     })
 }
@@ -322,7 +322,7 @@ pub(crate) fn assemble(
         prior: None,
         loss: None,
         given_blocks: Vec::new(),
-        first_of_motion: Vec::new(),
+        parts: Vec::new(),
         paired: Vec::new(),
     }
 }

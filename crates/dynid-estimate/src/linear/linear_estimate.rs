@@ -1,5 +1,7 @@
 //! The result that every linear estimator shares.
 
+use std::collections::BTreeMap;
+
 use super::irls::Loss;
 use super::method::LinearMethod;
 use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
@@ -68,8 +70,8 @@ pub struct LinearEstimate {
     pub converged: bool,
     /// Loss `Σ ρ(r/ŝ)` at the start of every pass with frozen scales; empty without a robust loss.
     pub losses: Vec<f64>,
-    /// Per log the one whose time blocks its own belong to; empty: each has blocks of its own.
-    pub(super) first_of_motion: Vec<usize>,
+    /// Per log and time block the part of a motion that it holds; empty: each block is one by itself.
+    pub(super) parts: Vec<Vec<usize>>,
     pub(super) prior: Option<Factor>,
     pub(super) loss: Option<Loss>,
     /// Time blocks as given, for total least squares solved again without a block; else none.
@@ -101,27 +103,32 @@ impl LinearEstimate {
         self
     }
 
-    /// Returns the estimate with the time blocks of logs that share a motion put together, block by block: what a model leaves over at a
-    /// place and speed comes back with the motion.
+    /// Returns the estimate with time blocks put together that hold the same part of a motion, within a log and from log to log: what a model
+    /// leaves over at a place and speed comes back with the motion.
     ///
-    /// `first_of_motion`: per log the first one that holds its motion, which may be itself. Panics unless there is one for every log.
+    /// `parts`: per log and block of [`Self::reduced`] the number of its part. Panics unless there is one for every block.
     #[must_use]
-    pub fn with_shared_motions(mut self, first_of_motion: &[usize]) -> LinearEstimate {
-        if first_of_motion.iter().enumerate().all(|(k, first)| k == *first) {
-            return self;
-        }
-        self.first_of_motion = first_of_motion.to_vec();
+    pub fn with_repeated_motions(mut self, parts: Vec<Vec<usize>>) -> LinearEstimate {
+        self.parts = parts;
         let weights = self.weights();
         self.blocks = self.time_blocks(&self.reduced, &weights, self.x.len());
         self
     }
 
     fn time_blocks(&self, groups: &[ReducedGroup], weights: &[f64], total: usize) -> Vec<Factor> {
-        if self.first_of_motion.is_empty() {
+        if self.parts.is_empty() {
             return time_blocks(groups, weights, total);
         }
-        let of_motion = |g: &ReducedGroup| ReducedGroup { log: self.first_of_motion[g.log], ..g.clone() };
-        time_blocks(&groups.iter().map(of_motion).collect::<Vec<_>>(), weights, total)
+        let mut of_part: BTreeMap<usize, Vec<Factor>> = BTreeMap::new();
+        for (group, weight) in groups.iter().zip(weights) {
+            for (block, part) in group.blocks.iter().zip(&self.parts[group.log]) {
+                if block.rows() > 0 {
+                    let weighted = block.scaled(*weight).embed(total, &group.columns);
+                    of_part.entry(*part).or_default().push(weighted);
+                }
+            }
+        }
+        of_part.values().map(|parts| Factor::merge(&parts.iter().collect::<Vec<_>>())).collect()
     }
 
     /// Parameters of the kept columns.

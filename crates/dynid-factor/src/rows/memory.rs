@@ -36,10 +36,11 @@ impl MemoryRows {
 
     /// Appends rows to a group.
     ///
-    /// Panics if the group does not exist, or the slices do not fit its columns.
+    /// Panics if the group does not exist, the slices do not fit its columns, or the block is out of order.
     pub fn push(&mut self, group: usize, rows: &Rows<'_>) {
         let shape = &self.shapes[group];
         assert!(rows.block < shape.blocks, "the block exists");
+        assert!(self.runs[group].last().is_none_or(|r| r.block <= rows.block), "blocks come in order");
         assert_eq!(rows.samples.len(), rows.effort.len(), "one sample per row");
         self.runs[group].push(Run::copy(rows, shape.columns.len()));
     }

@@ -1,10 +1,10 @@
 //! Closed-loop output error: rows of positions.
 
 use dynid_estimate::instruments::Simulated;
-use dynid_factor::Factor;
 use dynid_factor::groups::ReducedGroup;
-use dynid_factor::rows::{BlockReducer, GroupResiduals, GroupShape, Rows};
-use dynid_rows::conditioning::{ConditioningError, TimeBlocks};
+use dynid_factor::rows::GroupResiduals;
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_rows::conditioning::{ConditioningError, time_blocks};
 use dynid_sim::{DrivenMotion, position_slopes};
 use rayon::prelude::*;
 
@@ -74,30 +74,36 @@ impl Bench<'_> {
         let kernel_hz = self.closed.conditioning.map_or_else(textbook, |c| c.kernel_hz);
         let mut groups = Vec::new();
         for (log, moved) in driven.logs.iter().enumerate() {
-            let blocks = TimeBlocks::of(&problem.logs[log], kernel_hz, problem.logs.len(), &settings);
+            let (length, blocks) = time_blocks(&problem.logs[log], kernel_hz, problem.logs.len(), &settings);
             let outputs = moved.q.len();
-            let mut reducers: Vec<BlockReducer> = (0..outputs).map(|_| BlockReducer::new(total)).collect();
-            let mut fault = None;
+            let mut builders: Vec<FactorBuilder> = (0..outputs).map(|_| FactorBuilder::new(total)).collect();
+            let mut done: Vec<Vec<Factor>> = vec![Vec::new(); outputs];
+            let (mut open, mut fault) = (0, None);
             self.each_row((driven, shake), log, &mut |row| {
-                let rows = Rows {
-                    block: blocks.block(row.sample),
-                    samples: &[row.sample],
-                    regressor: row.slopes,
-                    stride: 1,
-                    effort: &[row.wanted],
-                };
-                if let Err(e) = reducers[row.output].push(&rows, None) {
+                let block = (row.sample / length).min(blocks - 1);
+                while open < block {
+                    done.iter_mut().zip(&mut builders).for_each(|(d, b)| d.push(b.take()));
+                    open += 1;
+                }
+                if let Err(e) = builders[row.output].push_row(row.slopes, row.wanted) {
                     fault.get_or_insert((row.output, e));
                 }
             })?;
             if let Some((output, source)) = fault {
                 return Err(Error::Conditioning(ConditioningError::Rows { output, source }));
             }
-            let of_output = |(output, reducer): (usize, BlockReducer)| {
-                let columns = (0..total).collect();
-                reducer.finish(&GroupShape { log, output, scale: 0, columns, blocks: blocks.count })
+            while open < blocks {
+                done.iter_mut().zip(&mut builders).for_each(|(d, b)| d.push(b.take()));
+                open += 1;
+            }
+            let of_output = |(output, blocks)| ReducedGroup {
+                log,
+                output,
+                scale: 0,
+                columns: (0..total).collect(),
+                blocks,
             };
-            groups.extend(reducers.into_iter().enumerate().map(of_output));
+            groups.extend(done.into_iter().enumerate().map(of_output));
         }
         Ok(groups)
     }

@@ -44,8 +44,8 @@ impl Reduction {
         fitting::check_rows(&groups, columns, || self.logs[0].facts.name.clone())?;
         let settings = fitting::linear_settings(&problem.settings);
         let found = estimate(&groups, None, columns, &problem.structure.method, &settings)?;
-        let duration_s = self.logs.iter().map(|log| log.facts.log.distinct_s()).sum();
-        let fitted = Fitted::with_blocks(found, self.recipe.blocks.wanted_s, duration_s);
+        let logs: Vec<&TrainedLog> = self.logs.iter().map(|log| &log.facts.log).collect();
+        let fitted = Fitted::with_blocks(found, self.recipe.blocks.wanted_s, &logs);
         progress(Step::Consistency);
         let consistent = consistency::consistent(&problem, &fitted, &groups)?;
         let rates: Vec<f64> = self.logs.iter().map(|log| log.facts.log.rate_hz).collect();

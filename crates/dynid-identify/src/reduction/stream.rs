@@ -8,7 +8,7 @@ use dynid_factor::rows::{BlockReducer, GroupShape, RowSource, RowVisitor, Rows, 
 use dynid_motion::clock::GridRows;
 use dynid_motion::{Channel, Portion, log::moves};
 use dynid_rows::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, RecordFigures, TimeBlocks, least_block_samples,
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, RecordFigures, least_block_samples,
 };
 
 use super::reduce::{Examined, Rest};
@@ -240,8 +240,6 @@ struct Pass<'a> {
     blocks: Vec<(GroupShape, Blocks)>,
     trained: TrainedLog,
     channels: Vec<Thinned>,
-    /// Time after which the motion repeats, samples, as the part says that tells what the log's own samples decide.
-    repeats_after: Option<f64>,
 }
 
 impl<'a> Pass<'a> {
@@ -267,7 +265,6 @@ impl<'a> Pass<'a> {
             blocks: Vec::new(),
             trained: TrainedLog::of_moves(part),
             channels: Vec::new(),
-            repeats_after: part.repeats_after,
         }
     }
 
@@ -281,10 +278,8 @@ impl<'a> Pass<'a> {
         let rows = LogRows::new(model, shape, kept, logs, self.choices, &self.settings)?;
         if self.blocks.is_empty() {
             let length = least_block_samples(self.choices.kernel_hz, prepared.rate_hz, &self.settings);
-            let of_period = |period| TimeBlocks::of_period(period, length, self.most_blocks);
-            let parts = self.repeats_after.map(of_period);
             let blocks = |shape: &GroupShape| {
-                (shape.clone(), Blocks::new(shape.columns.len(), length, self.most_blocks, parts))
+                (shape.clone(), Blocks::new(shape.columns.len(), length, self.most_blocks))
             };
             self.blocks = rows.groups().iter().map(blocks).collect();
         }
@@ -377,23 +372,16 @@ struct Blocks {
     /// Samples of a block.
     length: usize,
     most: usize,
-    /// Blocks that are parts of the period of a motion that repeats.
-    parts: Option<TimeBlocks>,
 }
 
 impl Blocks {
-    fn new(columns: usize, length: usize, most: usize, parts: Option<TimeBlocks>) -> Self {
-        Blocks { reducer: BlockReducer::new(columns), sums: RowSums::NONE, length, most, parts }
-    }
-
-    /// The block of a sample of the log.
-    fn block(&self, sample: usize) -> usize {
-        self.parts.map_or(sample / self.length, |parts| parts.block(sample))
+    fn new(columns: usize, length: usize, most: usize) -> Self {
+        Blocks { reducer: BlockReducer::new(columns), sums: RowSums::NONE, length, most }
     }
 
     /// Makes room for a sample of the log.
     fn reach(&mut self, sample: usize) {
-        while self.parts.is_none() && sample / self.length >= self.most {
+        while sample / self.length >= self.most {
             self.reducer.pair();
             self.length *= 2;
         }
@@ -402,7 +390,7 @@ impl Blocks {
     fn finish(mut self, shape: GroupShape, samples: usize) -> ReducedGroup {
         self.reach(samples.saturating_sub(1));
         // What is left behind the last whole block belongs to it.
-        let blocks = self.parts.map_or((samples / self.length).max(1), |parts| parts.count);
+        let blocks = (samples / self.length).max(1);
         self.reducer.finish(&GroupShape { blocks, ..shape })
     }
 }
@@ -422,9 +410,8 @@ impl RowVisitor for CoreRows<'_> {
         while start < end {
             let first = rows.samples[start] + from;
             self.blocks.reach(first);
-            let block = self.blocks.block(first);
-            let inside = |sample: &&usize| self.blocks.block(**sample + from) == block;
-            let count = rows.samples[start..end].iter().take_while(inside).count();
+            let (length, block) = (self.blocks.length, first / self.blocks.length);
+            let count = rows.samples[start..end].partition_point(|sample| (sample + from) / length == block);
             let part = Rows {
                 block,
                 samples: &rows.samples[start..start + count],

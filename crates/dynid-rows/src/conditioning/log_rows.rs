@@ -21,64 +21,24 @@ pub fn most_blocks(logs: usize) -> usize {
     (MOST_BLOCKS / logs.max(1)).clamp(1, MAX_BLOCKS)
 }
 
-/// Time blocks of a log.
-///
-/// Where the motion repeats they are parts of its period: what a model leaves over at a place and speed comes back with the motion, so that
-/// later periods are no independent witnesses of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimeBlocks {
-    /// Number of blocks.
-    pub count: usize,
-    /// Length of one, samples; of those that are no parts of a period a whole number, and the last one takes the rest.
-    length: f64,
-    /// Period of a motion that repeats, samples.
-    period: Option<f64>,
-    /// Samples by which the log lies behind the one whose blocks these are.
-    lag: f64,
-}
-
-impl TimeBlocks {
-    /// Time blocks of one of so many logs.
-    pub fn of(log: &PreparedLog, kernel_hz: f64, logs: usize, settings: &ConditioningSettings) -> Self {
-        let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
-        let least = least_block_samples(kernel_hz, log.rate_hz, settings);
-        // Logs that share a motion have the blocks of the first one.
-        let (samples, repeats_after, lag) = match log.shared {
-            Some(shared) => (shared.samples, shared.repeats_after, shared.lag),
-            None => (log.samples(), log.repeats_after, 0.0),
-        };
-        let blocks = match repeats_after {
-            Some(period) => TimeBlocks::of_period(period, least, most),
-            None => TimeBlocks::of_samples(samples, least, most),
-        };
-        TimeBlocks { lag, ..blocks }
-    }
-
-    /// Time blocks of one of so many logs whether or not its motion repeats.
-    fn in_time(log: &PreparedLog, kernel_hz: f64, logs: usize, settings: &ConditioningSettings) -> Self {
-        let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
-        let least = least_block_samples(kernel_hz, log.rate_hz, settings);
-        TimeBlocks::of_samples(log.samples(), least, most)
-    }
-
-    fn of_samples(samples: usize, least: usize, most: usize) -> Self {
-        let length = least.max(samples.div_ceil(most));
-        let count = (samples / length).max(1);
-        TimeBlocks { count, length: length as f64, period: None, lag: 0.0 }
-    }
-
-    /// Parts of a period, at least two where there may be so many: `least`, samples, is the length that they want; `most`: so many at most.
-    pub fn of_period(period: f64, least: usize, most: usize) -> Self {
-        let count = ((period / least as f64) as usize).max(2).min(most.max(1));
-        TimeBlocks { count, length: period / count as f64, period: Some(period), lag: 0.0 }
-    }
-
-    /// The block of a sample.
-    pub fn block(&self, sample: usize) -> usize {
-        let at = sample as f64 + self.lag;
-        let at = self.period.map_or(at.max(0.0), |period| at.rem_euclid(period));
-        ((at / self.length) as usize).min(self.count - 1)
-    }
+/// Length, samples, and number of the time blocks of one of so many logs; the last one takes the rest. Where a motion repeats its period is a
+/// whole number of blocks, two at least.
+pub fn time_blocks(
+    log: &PreparedLog,
+    kernel_hz: f64,
+    logs: usize,
+    settings: &ConditioningSettings,
+) -> (usize, usize) {
+    let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
+    let least = least_block_samples(kernel_hz, log.rate_hz, settings);
+    let length = least.max(log.samples().div_ceil(most));
+    let of_period = log.repeats_after.map(|period| {
+        let parts = (period / length as f64).floor().max(2.0);
+        ((period / parts).round() as usize).max(1)
+    });
+    // Where very many periods would have very many blocks, they are blocks of several periods.
+    let length = of_period.filter(|part| log.samples() / part <= MOST_BLOCKS).unwrap_or(length);
+    (length, (log.samples() / length).max(1))
 }
 
 /// Least length of a time block, samples: the stated one, and five times `1 / kernel_hz`.
@@ -116,7 +76,8 @@ pub(super) struct ConditionedLog<'a> {
     pub(super) kernels: Kernels,
     /// Per output: effort led by the delay.
     efforts: Vec<Vec<f64>>,
-    blocks: TimeBlocks,
+    block_length: usize,
+    blocks: usize,
 }
 
 impl<'a> ConditionedLog<'a> {
@@ -136,8 +97,8 @@ impl<'a> ConditionedLog<'a> {
             .into_par_iter()
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
-        let blocks = TimeBlocks::of(log, choices.kernel_hz, choices.state_hz.len(), settings);
-        Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, blocks })
+        let (block_length, blocks) = time_blocks(log, choices.kernel_hz, choices.state_hz.len(), settings);
+        Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
     }
 }
 
@@ -157,16 +118,6 @@ impl<'a> LogRows<'a> {
         settings: &ConditioningSettings,
     ) -> Result<Self, ConditioningError> {
         Self::of(model, shape, kept, logs.iter().enumerate(), choices, settings)
-    }
-
-    /// The rows in blocks of time also where motions repeat, for those who take rows and blocks in their order.
-    pub(super) fn in_time(mut self, choices: &Conditioning, settings: &ConditioningSettings) -> Self {
-        let groups = self.groups.len() / self.logs.len().max(1);
-        for (log, groups) in self.logs.iter_mut().zip(self.groups.chunks_mut(groups.max(1))) {
-            log.blocks = TimeBlocks::in_time(log.log, choices.kernel_hz, choices.state_hz.len(), settings);
-            groups.iter_mut().for_each(|group| group.blocks = log.blocks.count);
-        }
-        self
     }
 
     /// Rows of logs paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
@@ -215,7 +166,7 @@ impl<'a> LogRows<'a> {
                     output,
                     scale,
                     columns: positions.clone(),
-                    blocks: one.blocks.count,
+                    blocks: one.blocks,
                 }));
             }
             conditioned.push(one);
@@ -246,6 +197,7 @@ impl RowSource for LogRows<'_> {
                     effort: &log.efforts[output],
                     kernels: &log.kernels.kernels,
                     columns: self.columns.local[output].len() * (1 + usize::from(log.instruments.is_some())),
+                    block_length: log.block_length,
                     blocks: log.blocks,
                     net_effort: Vec::new(),
                 })
@@ -278,7 +230,8 @@ struct OutputRows<'a, 'b> {
     effort: &'a [f64],
     kernels: &'a [Kernel],
     columns: usize,
-    blocks: TimeBlocks,
+    block_length: usize,
+    blocks: usize,
     net_effort: Vec<f64>,
 }
 
@@ -290,8 +243,9 @@ impl RowConsumer for OutputRows<'_, '_> {
         self.net_effort.iter_mut().zip(offset).for_each(|(effort, known)| *effort -= known);
         let mut start = 0;
         while start < n {
-            let block = self.blocks.block(batch.centres[start]);
-            let count = batch.centres[start..].iter().take_while(|c| self.blocks.block(**c) == block).count();
+            let block_of = |centre: usize| (centre / self.block_length).min(self.blocks - 1);
+            let block = block_of(batch.centres[start]);
+            let count = batch.centres[start..].iter().take_while(|c| block_of(**c) == block).count();
             let rows = Rows {
                 block,
                 samples: &batch.centres[start..start + count],

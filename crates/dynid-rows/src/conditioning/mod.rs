@@ -17,6 +17,7 @@ mod predict;
 mod prepare;
 mod record_windows;
 mod reduce;
+mod repeated;
 mod rows;
 mod settings;
 mod shaped_rows;
@@ -32,14 +33,13 @@ pub use dynid_factor::groups::ReducedGroup;
 pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
 pub use friction_shape::{FrictionShape, ShapeKind};
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
-pub use log_rows::{LogRows, TimeBlocks, least_block_samples, most_blocks};
+pub use log_rows::{LogRows, least_block_samples, most_blocks, time_blocks};
 pub use moving::Moving;
 pub use predict::{predict, predict_along};
-pub use prepare::{
-    PeriodicMotion, PeriodsAveraged, PreparedLog, SharedMotion, first_of_motion, prepare, tell_shared_motions,
-};
+pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, prepare};
 pub use record_windows::{RecordFigures, Window};
 pub use reduce::reduce;
+pub use repeated::{LogMotion, SharedMotion, motions, parts_of_motions, tell_shared_motions};
 pub(crate) use rows::KeptColumns;
 pub use settings::{ConditioningSettings, FrictionSettings, Smoothing};
 pub use shaped_rows::{RefineError, ShapedRows, refine};

@@ -8,12 +8,13 @@ use std::sync::Arc;
 
 use dynid_model::EffortModel;
 use dynid_motion::clock::{self, ClockReport};
-use dynid_motion::repetition::{repeated_from, repetition};
+use dynid_motion::repetition::repetition;
 use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_noise};
 use dynid_motion::spikes::{self, SpikeLevel};
 use dynid_motion::{Channel, Log};
 use rayon::prelude::*;
 
+use super::repeated::SharedMotion;
 use super::{ConditioningError, ConditioningSettings};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
@@ -49,7 +50,7 @@ pub struct PreparedLog {
     pub clock: ClockReport,
     /// Time after which the motion repeats, samples, not whole; `None` where it does not.
     pub repeats_after: Option<f64>,
-    /// The motion that it shares with other logs ([`tell_shared_motions`]); `None` where no other log repeats it.
+    /// The motion that it shares with other logs ([`tell_shared_motions`](super::tell_shared_motions)); `None` where none repeats it.
     pub shared: Option<SharedMotion>,
     /// Motion of a known period, if one was stated; states then come from it.
     pub periodic: Option<PeriodicMotion>,
@@ -91,59 +92,10 @@ impl PreparedLog {
     }
 
     /// Positions of the joints that move.
-    fn moving(&self) -> Vec<&[f64]> {
+    pub(super) fn moving(&self) -> Vec<&[f64]> {
         let moving = self.position.iter().zip(&self.moves).filter(|(_, moves)| **moves);
         moving.map(|(position, _)| position.as_slice()).collect()
     }
-
-    /// Duration without what repeats, s.
-    pub fn distinct(&self) -> f64 {
-        self.repeats_after.map_or(f64::INFINITY, |samples| samples / self.rate_hz).min(self.duration())
-    }
-}
-
-/// The motion that several logs share, as the first of them holds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SharedMotion {
-    /// Which motion: the place of the first log that holds it among those that were compared.
-    pub motion: usize,
-    /// Samples by which a sample of this log lies behind that of the first one.
-    pub(super) lag: f64,
-    /// Samples of the first log, and time after which it repeats.
-    pub(super) samples: usize,
-    pub(super) repeats_after: Option<f64>,
-}
-
-/// Finds logs that repeat the motion of an earlier one, of the same sample rate and with the same joints moving.
-pub fn tell_shared_motions(logs: &mut [PreparedLog]) {
-    for k in 1..logs.len() {
-        let (earlier, later) = logs.split_at_mut(k);
-        let log = &mut later[0];
-        let of = |log: &PreparedLog, j: usize| log.shared.is_none_or(|shared| shared.motion == j);
-        for (j, first) in earlier.iter_mut().enumerate() {
-            let alike = (first.rate_hz / log.rate_hz - 1.0).abs() < 1e-3 && first.moves == log.moves;
-            // Others of a shared motion are compared by its first log alone.
-            if !alike || !of(first, j) {
-                continue;
-            }
-            let Some(lag) = repeated_from(&first.moving(), &log.moving(), log.rate_hz) else { continue };
-            let (samples, repeats_after) = (first.samples(), first.repeats_after);
-            let shared = SharedMotion { motion: j, lag: 0.0, samples, repeats_after };
-            first.shared = Some(shared);
-            log.shared = Some(SharedMotion { lag: lag as f64, ..shared });
-            break;
-        }
-    }
-}
-
-/// Per log the first one that holds its motion, which may be itself.
-pub fn first_of_motion(logs: &[PreparedLog]) -> Vec<usize> {
-    let same = |a: &PreparedLog, b: &PreparedLog| match (a.shared, b.shared) {
-        (Some(a), Some(b)) => a.motion == b.motion,
-        _ => false,
-    };
-    let first = |(k, log): (usize, &PreparedLog)| logs[..k].iter().position(|l| same(l, log)).unwrap_or(k);
-    logs.iter().enumerate().map(first).collect()
 }
 
 /// Puts a log on a uniform grid, removes spikes, measures noise and band.

@@ -88,7 +88,7 @@ impl<'a> ShapedRows<'a> {
         choices: &Conditioning,
         settings: &ConditioningSettings,
     ) -> Result<Self, ConditioningError> {
-        let rows = LogRows::new(model, shape, kept, logs, choices, settings)?.in_time(choices, settings);
+        let rows = LogRows::new(model, shape, kept, logs, choices, settings)?;
         let places = places(model, kept);
         let mut keepers: Vec<Keeper> = rows
             .groups()

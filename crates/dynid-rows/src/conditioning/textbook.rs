@@ -3,7 +3,7 @@
 use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::filter::{anti_alias, pick};
 
-use super::log_rows::{TimeBlocks, most_blocks};
+use super::log_rows::most_blocks;
 use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
@@ -167,9 +167,6 @@ fn rows_of<'a>(
             let per_block = ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize)
                 .max(effort.len().div_ceil(most))
                 .max(1);
-            let thinned_period = log.repeats_after.map(|period| period / factor as f64);
-            let of_period = thinned_period.map(|period| TimeBlocks::of_period(period, per_block, most));
-            let block_of = |k: usize| of_period.map_or(k / per_block, |blocks| blocks.block(k));
             let group = out.add_group(GroupShape {
                 log: l,
                 output,
@@ -178,12 +175,10 @@ fn rows_of<'a>(
                     Some(_) => paired_columns(positions, columns.total),
                     None => positions.clone(),
                 },
-                blocks: of_period.map_or(effort.len().div_ceil(per_block).max(1), |blocks| blocks.count),
+                blocks: effort.len().div_ceil(per_block).max(1),
             });
-            let mut start = 0;
-            while start < effort.len() {
-                let block = block_of(start);
-                let end = (start + 1..effort.len()).find(|k| block_of(*k) != block).unwrap_or(effort.len());
+            for start in (0..effort.len()).step_by(per_block) {
+                let end = (start + per_block).min(effort.len());
                 let used: Vec<usize> = (start..end).filter(|k| usable[*k]).collect();
                 let of = |signal: &[f64]| used.iter().map(|k| signal[*k]).collect::<Vec<f64>>();
                 let samples: Vec<usize> = used.iter().map(|k| inside.start + k * factor).collect();
@@ -191,14 +186,13 @@ fn rows_of<'a>(
                 out.push(
                     group,
                     &Rows {
-                        block,
+                        block: start / per_block,
                         samples: &samples,
                         regressor: &regressor,
                         stride: used.len(),
                         effort: &of(&effort),
                     },
                 );
-                start = end;
             }
         }
     }

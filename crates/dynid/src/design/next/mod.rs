@@ -1,10 +1,11 @@
 //! What to record next: the shortest further motion after which named parameters have the intervals that are wanted of them, given the factors
 //! of all earlier logs.
 //!
-//! The information of a periodic motion grows with its periods, `M(n) = M_logs + n M_period`, weighted as the fit of the logs weighs rows. The
-//! search makes the largest deviation of the wanted parameters, in units of what is wanted, as small as it can, for the number of periods that
-//! the motion before asked for, and with periods of several lengths. How many periods a motion asks for is told by a rehearsal: a log of it
-//! without noise is reduced by the recipe of the factors, so that kernels and masks take from it what they will take from the recorded one.
+//! The motion is one period, not repeated: what a model leaves over at a place and speed comes back with a motion, so that later periods are no
+//! independent witnesses of it. Its information, weighted as the fit of the logs weighs rows, is added to that of the logs,
+//! `M = M_logs + M_motion`. The search makes the largest deviation of the wanted parameters, in units of what is wanted, as small as it can, at
+//! several speeds, each for the time that the motion before asked for. What a motion gives is told by a rehearsal: its log without noise is
+//! reduced by the recipe of the factors, so that kernels and masks take from it what they will take from the recorded one.
 
 mod length;
 mod record;
@@ -29,7 +30,7 @@ use super::{DesignRun, DesignStep, finished};
 use crate::Error;
 use crate::config::ElementsConfig;
 use crate::estimate::Status;
-use length::{Lengths, Tried};
+use length::{Found, Lengths, Tried};
 pub use record::{IntervalRecord, NextLog, NextRecord, TriedRecord};
 use wanted::Goal;
 pub use wanted::{Wanted, WantedState, Width};
@@ -42,13 +43,13 @@ const NO_WEIGHT: f64 = 1e6;
 pub struct NextSettings {
     /// Intervals that are wanted.
     pub wanted: Vec<Wanted>,
-    /// Longest record, s. Default 300.
+    /// Longest record, s. Default 120.
     pub longest_s: f64,
 }
 
 impl Default for NextSettings {
     fn default() -> Self {
-        NextSettings { wanted: Vec::new(), longest_s: 300.0 }
+        NextSettings { wanted: Vec::new(), longest_s: 120.0 }
     }
 }
 
@@ -74,8 +75,8 @@ pub struct NextRun {
 
 /// Designs the shortest further motion after which parameters have the intervals that are wanted of them.
 ///
-/// Of `config` robot, limits and search count, and of the trajectory the form: its period is the longest that is tried, beside its half and
-/// its quarter. Criterion, elements, values and earlier trajectories have no effect, which the result says. `earlier`: factors of all logs so far, by one recipe. Results do not depend on the number of threads.
+/// Of `config` robot, limits and search count, and of the trajectory the form: its harmonics over its period are the slowest motion that is
+/// tried, beside faster ones. Criterion, elements, values and earlier trajectories have no effect, which the result says. `earlier`: factors of all logs so far, by one recipe. Results do not depend on the number of threads.
 ///
 /// # Errors
 /// [`Error::Setting`] for settings that would do nothing, names that are no parameters, and a robot file that is not the robot of the
@@ -134,20 +135,19 @@ pub fn next(
     let outcome = match found {
         Err(infeasible) => Outcome::Infeasible(infeasible),
         Ok(found) => {
-            let (one, cautions) = lengths.rehearsed(&set, found.period_s, &found.design.coefficients)?;
-            let periods = found.whole();
-            let further = one.scaled((periods as f64).sqrt());
-            let after = known.assess(&Factor::merge(&[known.information(), &further]));
-            lengths.pose(&mut set, found.period_s, periods);
+            let Found { period_s, harmonics, .. } = found;
+            let (rows, cautions) = lengths.rehearsed(&set, period_s, &found.design.coefficients)?;
+            let after = known.assess(&Factor::merge(&[known.information(), &rows]));
+            lengths.pose(&mut set, period_s, harmonics);
             run.config.trajectory =
-                TrajectoryConfig { period_s: found.period_s, periods, ..config.trajectory };
+                TrajectoryConfig { period_s, harmonics, periods: 1, ..config.trajectory.clone() };
             for goal in run.goals.iter_mut().filter(|g| g.is_open()) {
                 if after[goal.parameter].posterior_std <= goal.deviation {
                     goal.state = WantedState::Reached;
                 }
             }
             run.after = Some(after);
-            if periods == found.range.0 && run.known.lacking_s > 0.0 {
+            if run.known.lacking_s >= period_s {
                 run.notes.push(format!(
                     "logs and motion together are made as long as the time blocks behind standard deviations want: {:.0} s more",
                     run.known.lacking_s
@@ -193,7 +193,11 @@ fn unused(config: &DesignConfig) -> Vec<String> {
         ("earlier", !config.earlier.is_empty(), "factors of logs count in the place of trajectories"),
         ("elements", config.elements != ElementsConfig::default(), "the model is that of the factors"),
         ("values", !config.values.is_empty(), "the values are those of the factors"),
-        ("trajectory.periods", config.trajectory.periods != 1, "their number is what is looked for"),
+        (
+            "trajectory.periods",
+            config.trajectory.periods != 1,
+            "one period is recorded, as long as it has to be",
+        ),
         ("search.checkpoint", checkpoint.is_some(), "motions of several lengths are searched"),
         ("search.time_budget_s", time_budget_s.is_some(), "motions of several lengths are searched"),
     ];

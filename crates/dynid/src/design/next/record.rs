@@ -25,7 +25,7 @@ pub struct NextRecord {
     pub wanted: Vec<IntervalRecord>,
     /// All other parameters.
     pub others: Vec<IntervalRecord>,
-    /// Periods that were tried.
+    /// Speeds of motion that were tried.
     pub tried: Vec<TriedRecord>,
     /// Logs so far.
     pub logs: Vec<NextLog>,
@@ -59,13 +59,13 @@ pub struct IntervalRecord {
     pub combination: Option<String>,
 }
 
-/// A period that was tried.
+/// A speed of motion that was tried.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct TriedRecord {
-    /// Period, s.
-    pub period_s: f64,
-    /// Time after which its motion reaches all that is wanted, s; `None`: not within a thousand times the longest record.
-    pub seconds: Option<f64>,
+    /// Highest frequency of the motion, Hz.
+    pub highest_hz: f64,
+    /// Time after which such a motion reaches all that is wanted, s; `None`: not within ten thousand times its own.
+    pub needed_s: Option<f64>,
 }
 
 /// A log so far.
@@ -94,7 +94,7 @@ impl NextRun {
         let design = self.design.as_ref().map(|run| run.record(&self.config)).transpose()?;
         let trajectory = &self.config.trajectory;
         let moves = self.design.as_ref().is_some_and(|run| run.outcome.is_ok());
-        let recorded_s = moves.then(|| trajectory.periods as f64 * trajectory.period_s);
+        let recorded_s = moves.then_some(trajectory.period_s);
         let verdict = self.verdict(design.as_ref(), recorded_s);
         let is_wanted = |j: &usize| self.goals.iter().any(|g| g.parameter == *j);
         let others =
@@ -107,7 +107,7 @@ impl NextRun {
             wanted: self.goals.iter().map(|g| self.interval(g.parameter, Some(g))).collect(),
             others: others.collect(),
             tried: (self.tried.iter())
-                .map(|t| TriedRecord { period_s: t.period_s, seconds: t.seconds })
+                .map(|t| TriedRecord { highest_hz: t.highest_hz, needed_s: t.needed_s })
                 .collect(),
             logs: self.logs.clone(),
             provenance: match &design {
@@ -150,10 +150,8 @@ impl NextRun {
         let mut parts = Vec::new();
         match recorded_s {
             Some(seconds) => parts.push(format!(
-                "{seconds} s of motion ({} of {} s) will bring {reached} of {} wanted intervals",
-                periods(self.config.trajectory.periods),
-                self.config.trajectory.period_s,
-                wanted - holds,
+                "{seconds} s of motion will bring {reached} of {} wanted intervals",
+                wanted - holds
             )),
             None if left == 0 => {
                 parts.push("the logs so far give all wanted intervals: nothing has to be recorded".to_owned())
@@ -170,7 +168,7 @@ impl NextRun {
             (WantedState::Given, "no log is asked for"),
         ] {
             if count(state) > 0 && (recorded_s.is_some() || state != WantedState::NotReached) {
-                let seconds = self.tried.iter().filter_map(|t| t.seconds).reduce(f64::min);
+                let seconds = self.tried.iter().filter_map(|t| t.needed_s).reduce(f64::min);
                 let time = seconds.filter(|_| state == WantedState::NotReached);
                 parts.push(format!(
                     "{words} {}{}",
@@ -195,10 +193,6 @@ impl NextRun {
         }
         DesignVerdict { status, headline: parts.join("; "), warnings }
     }
-}
-
-fn periods(count: usize) -> String {
-    if count == 1 { "1 period".to_owned() } else { format!("{count} periods") }
 }
 
 fn worse(a: Outcome, b: Outcome) -> Outcome {
