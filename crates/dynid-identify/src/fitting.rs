@@ -304,9 +304,28 @@ impl Fitted {
             return Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
         }
         let in_time = Self::of_blocks(estimate, white.clone(), wanted.clone(), block_s, merged_blocks);
-        let estimate = in_time.estimate.with_repeated_motions(parts);
-        let fitted = Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
-        Fitted { inflation_in_time: in_time.inflation, ..fitted }
+        let estimate = in_time.estimate.clone().with_repeated_motions(parts);
+        let of_parts = Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
+        if !of_parts.is_robust() {
+            return in_time;
+        }
+        of_parts.at_least(&in_time)
+    }
+
+    /// With no variance below that of another account of the same fit: what changes with time does not show between parts of a motion, what
+    /// comes back with a motion not between blocks of time.
+    fn at_least(mut self, in_time: &Fitted) -> Self {
+        let (own, other) = (self.covariance(), in_time.covariance());
+        let ratio = |i: usize| if own[(i, i)] > 0.0 { other[(i, i)] / own[(i, i)] } else { 1.0 };
+        let root: Vec<f64> = (0..own.nrows()).map(|i| ratio(i).max(1.0).sqrt()).collect();
+        let raised = Mat::from_fn(own.nrows(), own.ncols(), |i, j| own[(i, j)] * root[i] * root[j]);
+        match self.jackknife.is_some() {
+            true => self.jackknife = Some(raised),
+            false => self.inflated = Some(raised),
+        }
+        self.inflation = self.inflation.max(in_time.inflation);
+        self.inflation_in_time = in_time.inflation;
+        self
     }
 
     fn of_blocks(

@@ -34,6 +34,7 @@ pub fn all() -> Vec<ResultSchema> {
         schema::<crate::inspect::LogInspection>("inspect-log", "`dynid inspect LOG --json`"),
         schema::<crate::export::RobotJson>("model", "`dynid export --model`"),
         schema::<crate::motions::MotionRecord>("motion", "`motion.json`"),
+        schema::<crate::design::next::NextRecord>("next", "`next.json`"),
         schema::<crate::online::Event>("online", "a line of `dynid online`"),
         schema::<crate::payload::PayloadFile>("payload", "`payload.json`"),
         schema::<crate::servo::ServoFile>("servo", "`servo.json`"),

@@ -218,8 +218,8 @@ const ENDINGS: &[Ending] = &[
                 "next arm.urdf --after arm.factors --want joint2.fc=5%",
             ),
             (
-                "So that all rotors are known to 0.01 kg m², with limits by a design file",
-                "next design.toml --after cell.factors --after lab.factors --want '*.Ia=0.01'",
+                "So that two rotors are known to 0.01 kg m², with limits by a design file and logs of two cells",
+                "next design.toml --after cell.factors --after lab.factors --want j3.Ia=0.01 --want j4.Ia=0.01",
             ),
         ],
     },

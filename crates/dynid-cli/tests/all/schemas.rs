@@ -117,6 +117,11 @@ fn results_keep_to_their_schemas() {
     run(at, &["solve", "a.factors", "--out", "solved"], 0);
     run(at, &["export", "out/estimate.json", "--model", "model.json", "--robot", &robot], 0);
     run(at, &["design", &robot, "--starts", "1", "--period", "4", "--out", "design"], 0);
+    run(
+        at,
+        &["next", &robot, "--after", "a.factors", "--want", "j3.Ia=5%", "--starts", "1", "--out", "next"],
+        0,
+    );
     let read = |name: &str| serde_json::from_slice::<Value>(&std::fs::read(at.join(name)).unwrap()).unwrap();
     let printed = |args: &[&str]| serde_json::from_slice::<Value>(&run(at, args, 0).stdout).unwrap();
     let (cell, solved) = ("out/estimate.json", "solved/estimate.json");
@@ -125,6 +130,7 @@ fn results_keep_to_their_schemas() {
         ("estimate", read(solved)),
         ("model", read("model.json")),
         ("design", read("design/design.json")),
+        ("next", read("next/next.json")),
         ("check", printed(&["check", &train, "--robot", &robot, "--json"])),
         ("diff", printed(&["diff", cell, solved, "--json"])),
         ("inspect", printed(&["inspect", &robot, "--json"])),

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use dynid_report::{
     Check, Chosen, ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
-    Fact, FramePath, InputFile, JointMotion, LimitUse, Obstacle, ParameterShare, Provenance, RandomMotion,
-    Robot, Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
+    Fact, FramePath, InputFile, IntervalForecast, JointMotion, LimitUse, Obstacle, ParameterShare,
+    Provenance, RandomMotion, Robot, Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
 };
 
 const PERIOD_S: f64 = 10.0;
@@ -58,6 +58,36 @@ pub(crate) fn design(joints: usize) -> DesignReport {
             geometric_ratio: Some(2.63),
             condition: Some(187.2),
         }),
+        intervals: vec![
+            IntervalForecast {
+                name: "joint_1.fc".into(),
+                unit: "N m".into(),
+                value: Some(3.1),
+                before: Some(0.4),
+                wanted: Some(0.1),
+                after: Some(0.09),
+                state: "reached".into(),
+                ..IntervalForecast::default()
+            },
+            IntervalForecast {
+                name: "link3.m".into(),
+                unit: "kg".into(),
+                value: Some(4.0),
+                wanted: Some(0.01),
+                state: "only in combination".into(),
+                is_missed: true,
+                note: "the data see m3 + m4".into(),
+                ..IntervalForecast::default()
+            },
+            IntervalForecast {
+                name: "joint_1.fv".into(),
+                unit: "N m s/rad".into(),
+                value: Some(0.8),
+                before: Some(0.05),
+                after: Some(0.02),
+                ..IntervalForecast::default()
+            },
+        ],
         parameters: parameters(joints.len()),
         confounded: vec![
             ConfoundedPair { names: ["fv4".into(), "fc4".into()], correlation: Some(-0.967) },

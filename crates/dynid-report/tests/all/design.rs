@@ -77,6 +77,7 @@ fn every_section_and_its_numbers_are_there() {
         "trajectory",
         "limits",
         "paths",
+        "intervals",
         "forecast",
         "parameters",
         "combinations",
@@ -96,6 +97,8 @@ fn every_section_and_its_numbers_are_there() {
         "<code>mx6 52 %</code>",
         "15 ended within all limits, <b>6 of them within 5 % of the best</b>",
         "2.183 (seed 3)",
+        "<span class=\"flag\">only in combination</span> <span class=\"note\">the data see m3 + m4</span>",
+        "<summary>1 other parameter</summary>",
         "5b41362bc82b7f3d",
     ] {
         assert!(page.contains(text), "{text}");

@@ -37,6 +37,7 @@ mod reaction_friction;
 mod recorded_logs;
 mod reduce;
 mod reduce_long;
+mod repeated_motions;
 mod report_page;
 mod safe_designs;
 mod servo;
