@@ -14,7 +14,6 @@ use dynid_motion::spikes::{self, SpikeLevel};
 use dynid_motion::{Channel, Log};
 use rayon::prelude::*;
 
-use super::repeated::SharedMotion;
 use super::{ConditioningError, ConditioningSettings};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
@@ -56,6 +55,15 @@ pub struct PreparedLog {
     pub periodic: Option<PeriodicMotion>,
     /// What was averaged, if the log is the mean of its periods ([`PreparedLog::averaged`]).
     pub averaged: Option<PeriodsAveraged>,
+}
+
+/// The motion that several logs share, as the first of them holds it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedMotion {
+    /// Which motion: the place of the first log that holds it among those that were compared.
+    pub motion: usize,
+    /// Samples by which a sample of this log lies behind that of the first one.
+    pub(super) lag: f64,
 }
 
 /// Periodic motion found in a log; see [`PreparedLog::with_period`].

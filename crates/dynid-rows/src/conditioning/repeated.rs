@@ -5,16 +5,7 @@
 
 use dynid_motion::repetition::repeated_from;
 
-use super::PreparedLog;
-
-/// The motion that several logs share, as the first of them holds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SharedMotion {
-    /// Which motion: the place of the first log that holds it among those that were compared.
-    pub motion: usize,
-    /// Samples by which a sample of this log lies behind that of the first one.
-    lag: f64,
-}
+use super::prepare::{PreparedLog, SharedMotion};
 
 /// The motion of a log, in any unit of time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -82,7 +82,7 @@ fn to_the_end(seed: u64, list: &[&str]) -> ([f64; 2], [usize; 2]) {
     assert!(record.wanted.iter().all(|w| w.state.is_some_and(is_known)), "{:?}", record.wanted);
     let designed = run.design.as_ref().unwrap().outcome.as_ref().unwrap();
     assert!(designed.broken.is_empty());
-    designed.motion.file.write(&at("next.json")).unwrap();
+    designed.motion.file.write(at("next.json")).unwrap();
     write_log(&recorded(seed + 100, Some(at("next.json"))), &at("second.csv"));
 
     let recipe = earlier.recipe().clone();
