@@ -40,6 +40,9 @@ pub struct Fitted {
     pub inflation: f64,
     /// The same from blocks of time alone, whether or not motions repeat: what held-out blocks of time differ by.
     pub inflation_in_time: f64,
+    /// Whether a motion repeats of which the time blocks hold no parts that could be told: what the model leaves over and comes back with it
+    /// does not show in any variance.
+    pub repetition_unseen: bool,
     /// Variance inflation joint by joint, where it can be told.
     pub inflation_per_output: Vec<Option<f64>>,
     /// Length of time blocks that the residuals ask for.
@@ -300,16 +303,16 @@ impl Fitted {
         let mut different: Vec<usize> = parts.concat();
         different.sort_unstable();
         different.dedup();
-        if different.len() == blocks.iter().sum::<usize>() {
-            return Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
-        }
+        let repetition_unseen =
+            !motions.iter().zip(&blocks).all(|(motion, blocks)| motion.has_parts(*blocks));
         let in_time = Self::of_blocks(estimate, white.clone(), wanted.clone(), block_s, merged_blocks);
+        if different.len() == blocks.iter().sum::<usize>() {
+            return Fitted { repetition_unseen, ..in_time };
+        }
         let estimate = in_time.estimate.clone().with_repeated_motions(parts);
         let of_parts = Self::of_blocks(estimate, white, wanted, block_s, merged_blocks);
-        if !of_parts.is_robust() {
-            return in_time;
-        }
-        of_parts.at_least(&in_time)
+        let fitted = if of_parts.is_robust() { of_parts.at_least(&in_time) } else { in_time };
+        Fitted { repetition_unseen, ..fitted }
     }
 
     /// With no variance below that of another account of the same fit: what changes with time does not show between parts of a motion, what
@@ -350,6 +353,7 @@ impl Fitted {
             jackknife,
             inflation,
             inflation_in_time: inflation,
+            repetition_unseen: false,
             inflation_per_output: per_output,
             block_length: wanted,
             block_s,

@@ -474,6 +474,10 @@ fn blocks(id: &Identification) -> CheckResult {
     let short = wanted > 1.01 * fitted.block_s;
     let period = id.trained.iter().filter_map(|log| log.repeats_after_s).reduce(f64::min);
     let repeated = match (period, id.trained.iter().any(|log| log.same_motion_as.is_some())) {
+        (Some(period), _) if fitted.repetition_unseen => format!(
+            " (the motion repeats after {period:.1} s, which is not some whole time blocks: what the model leaves over and comes back with it does \
+             not show, so intervals may be far too narrow)"
+        ),
         (Some(period), _) => format!(
             " (the motion repeats after {period:.1} s, and what the model leaves over comes back with it: blocks of the same part of the period count as one)"
         ),
@@ -484,7 +488,7 @@ fn blocks(id: &Identification) -> CheckResult {
         (None, false) => String::new(),
     };
     check(
-        graded(id.blocks() >= 20 && !short, true),
+        graded(id.blocks() >= 20 && !short && !fitted.repetition_unseen, true),
         CheckName::TimeBlocks,
         Some(id.blocks() as f64),
         "",

@@ -59,7 +59,18 @@ pub fn motions(logs: &[PreparedLog]) -> Vec<LogMotion> {
     logs.iter().enumerate().map(motion).collect()
 }
 
+/// How far a period may be from a whole number of blocks, in blocks: lengths of blocks are whole samples.
+const ROUNDED: f64 = 0.05;
+
 impl LogMotion {
+    /// Whether parts of the motion can be told from so many time blocks: it does not repeat, or its period is two or more whole blocks.
+    pub fn has_parts(&self, blocks: usize) -> bool {
+        let Some(period) = self.repeats_after else { return true };
+        let (parts, count) = (self.parts(blocks).0 as f64, blocks.max(1) as f64);
+        // The last block takes the rest, so that the others are shorter than the mean by up to a share of a block.
+        parts >= 2.0 && parts <= period * count / self.length * (1.0 + 1.0 / count) + ROUNDED
+    }
+
     /// Parts of the motion that so many time blocks of the log hold, and the length of one.
     ///
     /// A period is a whole number of blocks, of which the last one takes the rest of the log.
@@ -67,7 +78,7 @@ impl LogMotion {
         let mean = self.length / blocks.max(1) as f64;
         match self.repeats_after {
             Some(period) => {
-                let parts = ((period / mean - 1e-6).ceil() as usize).clamp(1, blocks.max(1));
+                let parts = ((period / mean - ROUNDED).ceil() as usize).clamp(1, blocks.max(1));
                 (parts, period / parts as f64)
             }
             None => (blocks, mean),
@@ -120,8 +131,22 @@ mod tests {
             parts_of_motions(&[once, again, plain(2.0, 2)], &[4, 3, 2]),
             [vec![0, 1, 2, 3], vec![1, 2, 3], vec![7, 8]]
         );
+        // Lengths of blocks are whole samples: 500 of a fifth of a period of 2500.4.
+        let rounded = LogMotion { repeats_after: Some(2500.4), ..plain(30_000.0, 0) };
+        assert_eq!(rounded.parts(60).0, 5);
+        assert_eq!(parts_of_motions(&[rounded], &[60])[0], (0..60).map(|b| b % 5).collect::<Vec<_>>());
         // The last block takes the rest.
         let rest = LogMotion { repeats_after: Some(3.0), ..plain(7.9, 0) };
         assert_eq!(parts_of_motions(&[rest], &[7]), [[0, 1, 2, 0, 1, 2, 0]]);
+    }
+
+    #[test]
+    fn parts_are_told_where_a_period_is_some_whole_blocks() {
+        let motion = |length: f64, period: f64| LogMotion { repeats_after: Some(period), ..plain(length, 0) };
+        assert!(plain(9.0, 0).has_parts(9));
+        assert!(motion(30_000.0, 2500.4).has_parts(60) && motion(7.9, 3.0).has_parts(7));
+        // A period within one block, and one that is two blocks and a half.
+        assert!(!motion(60.0, 0.9).has_parts(60));
+        assert!(!motion(60.0, 2.5).has_parts(60));
     }
 }

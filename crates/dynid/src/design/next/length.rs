@@ -46,10 +46,14 @@ pub(super) struct Found {
     pub(super) harmonics: usize,
     /// Share of the motion after which all is reached, more than 1 where more of its kind is needed; `None`: not within ten thousand.
     needed: Option<f64>,
+    /// What the recipe leaves of its rows.
+    pub(super) rows: Factor,
+    /// What reducing it gave cause for.
+    pub(super) cautions: Vec<Caution>,
 }
 
 impl Found {
-    pub(super) fn reaches(&self) -> bool {
+    fn reaches(&self) -> bool {
         self.needed.is_some_and(|share| share <= 1.0)
     }
 
@@ -171,8 +175,8 @@ impl Lengths<'_> {
 
     /// Shortest motion of a speed: that of as many harmonics as the configuration asks for, and what logs lack in length.
     fn shortest_s(&self, highest_hz: f64) -> f64 {
-        let least = (self.harmonics() as f64 / highest_hz).max(self.known.lacking_s.min(self.longest_s));
-        (least * PARTS_OF_SECOND).ceil() / PARTS_OF_SECOND
+        let whole = |seconds: f64| (seconds * PARTS_OF_SECOND).ceil() / PARTS_OF_SECOND;
+        whole(self.harmonics() as f64 / highest_hz).max(whole(self.known.lacking_s).min(self.longest_s))
     }
 
     /// Harmonics of a motion of some length and speed.
@@ -245,14 +249,14 @@ impl Lengths<'_> {
         Ok(match outcome.map_err(DesignError::from)? {
             Outcome::Infeasible(infeasible) => Err(infeasible),
             Outcome::Found(design) => {
-                let (rows, _) = self.rehearsed(set, period_s, &design.coefficients)?;
-                Ok(Found { needed: self.needed(&rows), design, period_s, harmonics })
+                let (rows, cautions) = self.rehearsed(set, period_s, &design.coefficients)?;
+                Ok(Found { needed: self.needed(&rows), design, period_s, harmonics, rows, cautions })
             }
         })
     }
 
     /// Information of a motion as the recipe leaves it, and what reducing it gave cause for: its log without noise is reduced as logs are.
-    pub(super) fn rehearsed(
+    fn rehearsed(
         &self,
         set: &RobotProblem,
         period_s: f64,

@@ -55,7 +55,7 @@ impl Default for NextSettings {
 
 /// A motion to record next, and what it will tell.
 pub struct NextRun {
-    /// The configuration with what was chosen: period, number of periods, noise.
+    /// The configuration with what was chosen: period, harmonics, time between independent rows.
     pub config: DesignConfig,
     /// The motion, or why there is none; `None` if nothing has to be recorded, or no motion would help.
     pub design: Option<DesignRun>,
@@ -76,10 +76,11 @@ pub struct NextRun {
 /// Designs the shortest further motion after which parameters have the intervals that are wanted of them.
 ///
 /// Of `config` robot, limits and search count, and of the trajectory the form: its harmonics over its period are the slowest motion that is
-/// tried, beside faster ones. Criterion, elements, values and earlier trajectories have no effect, which the result says. `earlier`: factors of all logs so far, by one recipe. Results do not depend on the number of threads.
+/// tried, beside faster ones. Criterion, elements, values and earlier trajectories have no effect, which the result says. `earlier`: factors of
+/// all logs so far, by one recipe. Results do not depend on the number of threads.
 ///
 /// # Errors
-/// [`Error::Setting`] for settings that would do nothing, names that are no parameters, and a robot file that is not the robot of the
+/// [`Error::Setting`] for nothing that is wanted, names that are no parameters, a longest record that is shorter than any motion, and a robot file that is not the robot of the
 /// factors; what [`Reduction::solve`] and [`super::design`] refuse. A motion that does not reach all that is wanted is a result.
 pub fn next(
     config: &DesignConfig,
@@ -135,8 +136,7 @@ pub fn next(
     let outcome = match found {
         Err(infeasible) => Outcome::Infeasible(infeasible),
         Ok(found) => {
-            let Found { period_s, harmonics, .. } = found;
-            let (rows, cautions) = lengths.rehearsed(&set, period_s, &found.design.coefficients)?;
+            let Found { design, period_s, harmonics, rows, cautions, .. } = found;
             let after = known.assess(&Factor::merge(&[known.information(), &rows]));
             lengths.pose(&mut set, period_s, harmonics);
             run.config.trajectory =
@@ -154,7 +154,7 @@ pub fn next(
                 ));
             }
             run.warnings.extend(cautions.into_iter().map(|caution| caution.message));
-            Outcome::Found(found.design)
+            Outcome::Found(design)
         }
     };
     run.design = Some(finished(robot, set, &run.config, outcome, parking.as_deref(), progress)?);
@@ -217,7 +217,7 @@ fn effective(config: &DesignConfig, known: &Knowledge) -> DesignConfig {
 
 /// What is wanted of parameters that the logs so far do not give, as combinations of the base parameters; `None` if there is nothing to do.
 fn combinations(goals: &[Goal], known: &Knowledge) -> Option<Mat> {
-    let open = goals.iter().filter(|g| g.state == WantedState::NotReached);
+    let open = goals.iter().filter(|g| g.is_open());
     let rows: Vec<Vec<f64>> = open.filter_map(|g| known.combination(g.parameter, g.deviation)).collect();
     let columns = rows.first()?.len();
     Some(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j]))

@@ -173,7 +173,7 @@ impl NextRun {
                 parts.push(format!(
                     "{words} {}{}",
                     names(state),
-                    time.map_or_else(String::new, |s| format!(" ({s:.0} s)"))
+                    time.map_or_else(String::new, |s| format!(" (about {s:.0} s)"))
                 ));
             }
         }

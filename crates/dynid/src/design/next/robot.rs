@@ -22,17 +22,22 @@ pub(super) fn robot(config: &DesignConfig, recipe: &Recipe, of_factors: &Robot) 
     config.gravity = config.gravity.or(Some(recipe.model.gravity));
     let mut robot = load(&config)?;
     let moved = of_factors.mechanism.rate_names();
+    let refused = |expected: String| Err(Error::setting("robot", &expected, config.robot.display()));
+    let own = robot.mechanism.rate_names();
+    if let Some(joint) = moved.iter().find(|joint| !own.contains(joint)) {
+        return refused(format!("the robot of the factors, with a joint `{joint}` that moves"));
+    }
     let held: Vec<String> =
         robot.mechanism.rate_names().into_iter().filter(|joint| !moved.contains(joint)).collect();
     if robot.closed.is_none() && !held.is_empty() {
-        config.locked.extend(held.into_iter().map(|joint| (joint, 0.0)));
-        robot = load(&config)?;
+        let mut held_too = config.clone();
+        held_too.locked.extend(held.into_iter().map(|joint| (joint, 0.0)));
+        robot = load(&held_too)?;
     }
     let [own, other] = [&robot, of_factors].map(|r| r.mechanism.gravity().0);
     if differ(&own, &other) {
         return Err(Error::setting("gravity", &format!("{other:?}, that of the logs"), format!("{own:?}")));
     }
-    let refused = |expected: String| Err(Error::setting("robot", &expected, config.robot.display()));
     for joint in &of_factors.file.description.joints {
         let name = &joint.name;
         match robot.file.description.joints.iter().find(|j| j.name == *name) {
