@@ -2,7 +2,8 @@
 """Accuracy on simulated arms with known truth: makes them, identifies them by the program, compares two programs.
 
     arms.py make  FOLDER [--count 60] [--seed 1] [--dynid PROGRAM]
-    arms.py score FOLDER [--dynid PROGRAM] [--out SCORES.json] [--settings KEYS.toml]
+    arms.py rest  FOLDER [--dynid PROGRAM]
+    arms.py score FOLDER [--dynid PROGRAM] [--out SCORES.json] [--settings KEYS.toml] [--logs train|singles|poses]
     arms.py compare BEFORE.json AFTER.json
 
 Arms have 4 to 7 joints; friction is linear, falls from rest (Stribeck), differs by direction, grows as a power of speed, or is mixed. Logs come
@@ -10,6 +11,9 @@ from a simulated controller, with noise, encoder steps, delay, ripple, outliers,
 identification gets has other inertias than the truth: scaled and turned, or uniform links where the truth has its mass at the ends.
 The error is that of the data's README: root mean square over joints of (rms of clean true effort minus prediction at the true states, where
 |v| > 0.02 rad/s) over the rms of the true effort, on two motions that were not fitted. Needs numpy.
+
+`rest` adds logs in which joints stand: `singles`, one per joint that moves at three speeds while the others hold still, which `score` fits beside the
+log of all joints; and `poses`, moves of some joints from pose to pose with pauses, which it fits in place of it.
 """
 
 import argparse
@@ -219,6 +223,68 @@ def draw(folder, number, seeds, dynid):
     return about
 
 
+def leg(start, end, rate, duration):
+    """A move between two poses, of fifth order: at rest at either end."""
+    x = np.arange(1, round(duration * rate) + 1)[:, None] / round(duration * rate)
+    return start + (end - start) * (10 * x**3 - 15 * x**4 + 6 * x**5)
+
+
+def single(joint, pose, limit, rate):
+    """One joint forth and back at three speeds, each reached within 0.2 s."""
+    q = [np.tile(pose, (round(0.5 * rate), 1))]
+    for share in (0.1, 0.3, 0.8):
+        speed = share * limit
+        for sign in (1, -1, -1, 1):
+            travel = min(1.5, 0.5 / speed)
+            ramp = np.concatenate([np.linspace(0, 1, round(0.2 * rate)), np.ones(round(travel * rate)), np.linspace(1, 0, round(0.2 * rate))])
+            way = np.tile(q[-1][-1], (len(ramp), 1))
+            way[:, joint] += sign * speed * np.cumsum(ramp) / rate
+            q.append(way)
+            q.append(np.tile(way[-1], (round(0.3 * rate), 1)))
+    return np.concatenate(q)
+
+
+def poses(rng, limits, rate, duration):
+    """From pose to pose: every move takes about a third of the joints, and pauses follow."""
+    pose = np.zeros(len(limits))
+    q = [np.tile(pose, (round(0.5 * rate), 1))]
+    while sum(map(len, q)) < duration * rate:
+        moves = rng.random(len(limits)) < 0.4
+        target = np.where(moves, rng.uniform(-0.7, 0.7, len(limits)) * [x[0] for x in limits], pose)
+        # The peak speed of such a move is 1.875 of the mean.
+        least = max(1.875 * np.abs(target - pose) / (0.8 * np.array([x[1] for x in limits])))
+        q.append(leg(pose, target, rate, max(least, 0.4)))
+        q.append(np.tile(target, (round(rng.uniform(0.2, 0.8) * rate), 1)))
+        pose = target
+    return np.concatenate(q)
+
+
+def rest_one(here, dynid):
+    """Logs of an arm in which joints stand."""
+    about = json.loads((here / "about.json").read_text())
+    rng, n, rate = np.random.default_rng([5, about["number"]]), about["joints"], about["rate_hz"]
+    found = re.findall(r'position = \["-(\d+)deg".*velocity = ([\d.]+)', (here / "robot.toml").read_text())
+    limits = [(math.radians(float(p)), float(v)) for p, v in found]
+    base = rng.uniform(-0.4, 0.4, n) * [p for p, _ in limits]
+    motions = {f"single{k + 1}": single(k, base, limits[k][1], rate) for k in range(n)}
+    motions["poses"] = poses(rng, limits, rate, 25)
+    keys = (here / "train.toml").read_text()
+    keys = re.sub(r"(?m)^(duration_s|harmonics|acceleration) = .*\n", "", keys)
+    for name, q in motions.items():
+        dq, t = np.gradient(q, 1 / rate, axis=0), np.arange(len(q)) / rate
+        ddq = np.gradient(dq, 1 / rate, axis=0)
+        header = ",".join(["t"] + [f"{of}_j{k + 1}" for of in ("q", "dq", "ddq") for k in range(n)])
+        np.savetxt(here / f"{name}_motion.csv", np.column_stack([t, q, dq, ddq]), delimiter=",", header=header, comments="")
+        (here / f"{name}.toml").write_text(f'follow = "{name}_motion.csv"\n' + keys)
+        made = subprocess.run(
+            [dynid, "simulate", str(here / "truth.toml"), "--config", str(here / f"{name}.toml"), "--out", str(here / f"{name}.csv.gz"), "--force"],
+            capture_output=True,
+            text=True,
+        )
+        if made.returncode:
+            raise SystemExit(f"{here}: {made.stderr}")
+
+
 def table(path):
     """Columns of a table by name."""
     opened = gzip.open(path, "rt") if str(path).endswith(".gz") else open(path)
@@ -241,12 +307,14 @@ def of_truth(expression, truth):
     return eval(SYMBOL.sub(value, text), {"__builtins__": {}})  # numbers, signs and brackets alone
 
 
-def score_one(here, dynid, settings):
+def score_one(here, dynid, settings, logs):
     """Error on both motions, coverage of intervals, shapes that were taken."""
     about = json.loads((here / "about.json").read_text())
     out = here / ("out-" + str(os.getpid()))
     config = here / f"run-{os.getpid()}.toml"
-    config.write_text(f'robot = "robot.toml"\nlog = [{{ path = "train.csv.gz" }}]\n{settings}')
+    names = {"train": ["train"], "poses": ["poses"], "singles": ["train"] + [f"single{k + 1}" for k in range(about["joints"])]}[logs]
+    listed = ", ".join(f'{{ path = "{name}.csv.gz" }}' for name in names)
+    config.write_text(f'robot = "robot.toml"\nlog = [{listed}]\n{settings}')
     command = [dynid, "identify", config, "--out", out]
     ran = subprocess.run(list(map(str, command)), capture_output=True, text=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})
     if not (out / "estimate.json").exists():
@@ -293,6 +361,7 @@ def score_one(here, dynid, settings):
         "inside": inside,
         "seen": seen,
         "taken": taken,
+        "verdict": estimate["verdict"]["status"],
         "kernel_hz": choices["kernel cut-off"]["value"],
         "state_hz": choices["state cut-off"]["value"],
     }
@@ -313,17 +382,21 @@ def compare(before, after):
             worse.append(number)
         print(f"{number:3d} {a['kind']:10s} {a['geometry']:8s} {a['fast']:.5f} {a['slow']:.5f} -> {b['fast']:.5f} {b['slow']:.5f}  {ratio:.3f}")
     cover = [sum(s.get("inside", 0) for s in x.values()) / max(1, sum(s.get("seen", 0) for s in x.values())) for x in (old, new)]
+    for name, x in (("before", old), ("after", new)):
+        verdicts = [s.get("verdict") for s in x.values()]
+        print(f"{name}: {', '.join(f'{verdicts.count(v)} {v}' for v in ('ok', 'warn', 'fail'))}")
     print(f"geometric mean of ratios {math.exp(sum(logs) / len(logs)):.4f}; more than 5 % worse: {worse}; coverage {cover[0]:.4f} -> {cover[1]:.4f}")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["make", "score", "compare"])
+    parser.add_argument("what", choices=["make", "rest", "score", "compare"])
     parser.add_argument("paths", nargs="+", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--dynid", default="target/release/dynid")
     parser.add_argument("--settings", type=Path, help="further keys of the configuration")
+    parser.add_argument("--logs", choices=["train", "singles", "poses"], default="train")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
     settings = args.settings.read_text() if args.settings else ""
@@ -335,7 +408,10 @@ def main():
             list(pool.map(lambda k: make_one(folder, k, args.seed, args.dynid), range(args.count)))
             return None
         arms = sorted(p for p in folder.iterdir() if (p / "train.csv.gz").exists())[: args.count]
-        scores = list(pool.map(lambda here: score_one(here, args.dynid, settings), arms))
+        if args.what == "rest":
+            list(pool.map(lambda here: rest_one(here, args.dynid), arms))
+            return None
+        scores = list(pool.map(lambda here: score_one(here, args.dynid, settings, args.logs), arms))
     text = json.dumps(scores, indent=1)
     (args.out or Path(folder / "scores.json")).write_text(text)
     good = [s for s in scores if "failed" not in s]

@@ -24,6 +24,8 @@ pub struct Fit {
     pub channels: Vec<ChannelFit>,
     /// `100 √(Σ_j ‖τ_j - τ̂_j‖²/Σ_j ‖τ_j‖²)` in percent; `None` if all signals are zero or empty.
     pub relative_error: Option<f64>,
+    /// What these figures are formed from.
+    pub sums: FitSums,
 }
 
 /// Signals that cannot be compared.
@@ -77,11 +79,10 @@ pub fn fit<M: AsRef<[f64]>, P: AsRef<[f64]>>(measured: &[M], predicted: &[P]) ->
 }
 
 /// Agreement of channels that come one after the other, so that signals need not be held together.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct FitSums {
-    channels: Vec<ChannelFit>,
-    error_energy: f64,
-    energy: f64,
+    /// Per channel: its sums, and whether it counts in the figure over all channels.
+    channels: Vec<(ChannelSums, bool)>,
 }
 
 impl FitSums {
@@ -101,31 +102,59 @@ impl FitSums {
 
     /// Takes the sums of the next channel. `counts`: whether it counts in the figure over all channels.
     pub fn add(&mut self, sums: &ChannelSums, counts: bool) {
-        if counts {
-            self.error_energy += sums.error_energy;
-            self.energy += sums.energy;
+        self.channels.push((*sums, counts));
+    }
+
+    /// Sums of several records of the same channels. Variations are those about the mean of each record, so that figures formed of them say
+    /// what is explained within the records and nothing of the differences between them.
+    pub fn pooled<'a>(records: impl IntoIterator<Item = &'a FitSums>) -> FitSums {
+        let mut records = records.into_iter();
+        let mut out = records.next().cloned().unwrap_or_default();
+        for record in records {
+            for ((sums, _), (more, _)) in out.channels.iter_mut().zip(&record.channels) {
+                sums.add(more);
+            }
         }
-        self.channels.push(sums.fit());
+        out
+    }
+
+    /// Sums of a channel.
+    pub fn channel(&self, channel: usize) -> &ChannelSums {
+        &self.channels[channel].0
     }
 
     /// Agreement of all channels taken.
     pub fn fit(self) -> Fit {
-        Fit { channels: self.channels, relative_error: percent(self.error_energy, self.energy) }
+        let counting = || self.channels.iter().filter(|(_, counts)| *counts).map(|(sums, _)| sums);
+        let error_energy = counting().map(|sums| sums.error_energy).sum();
+        let energy = counting().map(|sums| sums.energy).sum();
+        Fit {
+            channels: self.channels.iter().map(|(sums, _)| sums.fit()).collect(),
+            relative_error: percent(error_energy, energy),
+            sums: self,
+        }
     }
 }
 
 /// What the agreement of a channel is formed from.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ChannelSums {
-    samples: usize,
-    error_energy: f64,
-    energy: f64,
-    variation: f64,
-    range: f64,
+    /// Number of samples.
+    pub samples: usize,
+    /// `Σ(τ - τ̂)²`.
+    pub error_energy: f64,
+    /// `Σ τ²`.
+    pub energy: f64,
+    /// `Σ(τ - τ̄)²`; 0: of no meaning, as are the figures that need it.
+    pub variation: f64,
+    /// `max τ - min τ`.
+    pub range: f64,
     /// `Σ(τ - τ̄)(τ̂ - τ̂̄)`.
-    common: f64,
-    predicted_variation: f64,
-    predicted_range: f64,
+    pub common: f64,
+    /// `Σ(τ̂ - τ̂̄)²`.
+    pub predicted_variation: f64,
+    /// `max τ̂ - min τ̂`; 0: no correlation is formed.
+    pub predicted_range: f64,
 }
 
 impl ChannelSums {
@@ -165,14 +194,27 @@ impl ChannelSums {
             error_energy,
             energy,
             variation,
-            range: highest - lowest,
+            range: (highest - lowest).max(0.0),
             common,
             predicted_variation,
-            predicted_range: most - least,
+            predicted_range: (most - least).max(0.0),
         })
     }
 
-    fn fit(&self) -> ChannelFit {
+    /// Adds those of another record. Ranges are the greater ones.
+    fn add(&mut self, more: &ChannelSums) {
+        self.samples += more.samples;
+        self.error_energy += more.error_energy;
+        self.energy += more.energy;
+        self.variation += more.variation;
+        self.range = self.range.max(more.range);
+        self.common += more.common;
+        self.predicted_variation += more.predicted_variation;
+        self.predicted_range = self.predicted_range.max(more.predicted_range);
+    }
+
+    /// The agreement.
+    pub fn fit(&self) -> ChannelFit {
         let rms = (self.samples > 0).then(|| (self.error_energy / self.samples as f64).sqrt());
         // The variation of a constant signal is rounding about its mean; its range is exactly zero.
         let varies = self.range > 0.0 && self.variation > 0.0;
@@ -212,6 +254,23 @@ mod tests {
         assert!((first.correlation.unwrap() - 16.0 / 280.0_f64.sqrt()).abs() < 4.0 * f64::EPSILON);
         assert_eq!(fit.channels[1].correlation, None);
         assert_eq!(fit.relative_error, Some(100.0 * (14.0_f64 / 40.0).sqrt()));
+    }
+
+    #[test]
+    fn records_pool_to_what_is_explained_within_them() {
+        let of = |level: f64, error: f64| {
+            let measured: Vec<f64> = (0..100).map(|k| level + (0.3 * f64::from(k)).sin()).collect();
+            let predicted: Vec<f64> = measured.iter().map(|x| x + error).collect();
+            fit(&[measured], &[predicted]).unwrap()
+        };
+        let (first, second) = (of(0.0, 0.1), of(50.0, 0.3));
+        let pooled = FitSums::pooled([&first.sums, &second.sums]).fit();
+        assert!((pooled.channels[0].rms.unwrap() - 0.05_f64.sqrt()).abs() < 1e-12);
+        // A level that differs between the records explains nothing.
+        let r2 = [&first, &second].map(|f| f.channels[0].r2.unwrap());
+        assert!((pooled.channels[0].r2.unwrap() - 0.5 * (r2[0] + r2[1])).abs() < 1e-12);
+        assert_eq!(FitSums::pooled([&first.sums]).fit(), first);
+        assert_eq!(FitSums::pooled([]).fit().channels, []);
     }
 
     #[test]

@@ -320,6 +320,34 @@ impl Agreement {
     }
 }
 
+/// Share of the samples of a log that a joint must move in for the log to speak of its motion, where other logs do.
+const MOTION: f64 = 0.05;
+
+/// Share of the variance of an output's filtered effort that is explained where the joint moves, one entry per log that moves it. An
+/// effort that never changes has none, and nothing to explain.
+///
+/// The variance is that within the log, or within all of the logs where that is greater: an effort that hardly changes in one log (another joint
+/// was being tested) is explained by what is a small error elsewhere. Of a joint that moves in no log to speak of, all samples count.
+pub(crate) fn explained_in_motion(agreements: &[&Agreement], output: usize) -> Vec<f64> {
+    let shares = |sums: &[&ChannelSums]| -> Vec<f64> {
+        let samples: usize = sums.iter().map(|s| s.samples).sum();
+        let mean = sums.iter().map(|s| s.variation).sum::<f64>() / samples.max(1) as f64;
+        let share = |s: &&ChannelSums| {
+            let variation = s.variation.max(mean * s.samples as f64);
+            (s.samples > 0 && s.range > 0.0 && variation > 0.0).then(|| 1.0 - s.error_energy / variation)
+        };
+        sums.iter().filter_map(share).collect()
+    };
+    let logs: Vec<&Agreement> = agreements.iter().copied().filter(|a| a.moves[output]).collect();
+    let speaks = |a: &&&Agreement| 1.0 - a.standing_share[output] >= MOTION;
+    let moving: Vec<&ChannelSums> =
+        logs.iter().filter(speaks).map(|a| a.moving.sums.channel(output)).collect();
+    match shares(&moving) {
+        shares if !shares.is_empty() => shares,
+        _ => shares(&logs.iter().map(|a| a.filtered.sums.channel(output)).collect::<Vec<_>>()),
+    }
+}
+
 fn conditioning(e: dynid_motion::SignalError) -> Error {
     Error::Conditioning(e.into())
 }

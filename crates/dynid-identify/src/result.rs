@@ -12,7 +12,7 @@ use dynid_model::{EffortModel, Inertia, Owner, Ties};
 use dynid_record::{Origin, ParameterVerdict, ShapeVerdict};
 use serde_json::json;
 
-use crate::agreement::{Agreement, FitValues};
+use crate::agreement::FitValues;
 use crate::estimate::{
     BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, ExportedRecord, FitSummary, LogScale,
     ModelRecord, ParameterValue, Provenance, RankStatus, ReadingRecord, SCHEMA, ShapeValue, by_motion,
@@ -307,27 +307,17 @@ impl Identification {
     }
 
     fn fit_summary(&self) -> FitSummary {
-        if !self.row_fits.is_empty() {
-            let rows: Vec<(FitValues, usize)> =
-                self.row_fits.iter().map(|fit| (fit.values.clone(), fit.rows)).collect();
-            let none = FitValues::unknown(self.row_fits[0].values.rms.len());
-            let filter_hz = self.kernel_hz;
+        if let Some(first) = self.row_fits.first() {
             return FitSummary {
-                raw: none,
-                filtered: pool(&rows),
-                filter_hz,
+                raw: FitValues::unknown(first.fit.channels.len()),
+                filtered: pool(self.row_fits.iter().map(|rows| &rows.fit)),
+                filter_hz: self.kernel_hz,
                 by_motion: ByMotion::default(),
             };
         }
-        // One log is shown as it is; of several, the worst joint by joint would mislead, so errors are pooled.
-        let pooled = |pick: &dyn Fn(&Agreement) -> FitValues| -> FitValues {
-            let all: Vec<(FitValues, usize)> =
-                self.training.iter().map(|a| (pick(a), a.counted.iter().filter(|c| **c).count())).collect();
-            pool(&all)
-        };
         FitSummary {
-            raw: pooled(&|a| FitValues::from(&a.raw)),
-            filtered: pooled(&|a| FitValues::from(&a.filtered)),
+            raw: pool(self.training.iter().map(|a| &a.raw)),
+            filtered: pool(self.training.iter().map(|a| &a.filtered)),
             filter_hz: self.kernel_hz,
             by_motion: by_motion(&self.training),
         }

@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
+use dynid_estimate::metrics::Fit;
 use dynid_rows::conditioning::{PreparedLog, motions};
 use serde::{Deserialize, Serialize};
-
-use crate::agreement::FitValues;
 
 /// Positions are compared over this time, s: spikes and noise count little then.
 pub(crate) const SPEED_SPAN_S: f64 = 0.05;
@@ -97,10 +96,8 @@ impl TrainedLog {
 pub struct RowFit {
     /// Log.
     pub log: String,
-    /// Rows of the widest kernel, all outputs together.
-    pub rows: usize,
-    /// Figures, output by output; R² of outputs that move in the log alone.
-    pub values: FitValues,
+    /// Figures on the rows of the widest kernel, output by output, without correlations; R² of outputs that move in the log alone.
+    pub fit: Fit,
 }
 
 /// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`], with rest; `None` if it does not move.

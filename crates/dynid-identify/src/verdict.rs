@@ -9,7 +9,7 @@ use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as TrustVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
 
-use crate::agreement::Agreement;
+use crate::agreement::{Agreement, explained_in_motion};
 use crate::caution::{self, Caution};
 pub use crate::check::CheckName;
 use crate::check::CheckResult;
@@ -75,17 +75,7 @@ pub fn judge(id: &Identification) -> Verdict {
     let ties = ties(id, &checks);
     checks.extend(ties);
     let status = checks.iter().map(|c| c.status).max().unwrap_or(Status::Ok);
-    let relative =
-        |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
-    let of_rows = || id.row_fits.iter().filter_map(|f| f.values.relative_error).fold(f64::NAN, f64::max);
-    let unseen = id.unseen();
-    let (error, agrees) = if unseen.is_empty() && !id.row_fits.is_empty() {
-        (of_rows(), "reproduces the rows of the training logs")
-    } else if unseen.is_empty() {
-        (relative(&id.training.iter().collect::<Vec<_>>()), "reproduces the training logs")
-    } else {
-        (relative(&unseen), "predicts logs it has not seen")
-    };
+    let (error, where_) = relative_error(id);
     let named = |level: Status| {
         let names = checks.iter().filter(|c| c.status == level).map(|c| c.name.word());
         names.collect::<Vec<_>>().join(", ")
@@ -102,7 +92,7 @@ pub fn judge(id: &Identification) -> Verdict {
         }
     };
     let line =
-        format!("{}; the model {agrees} within {error:.1} % of the effort", id.counts().base_in_words());
+        format!("{}; the model {where_} within {error:.1} % of the effort", id.counts().base_in_words());
     let warnings: Vec<Caution> =
         id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
     Verdict {
@@ -115,6 +105,32 @@ pub fn judge(id: &Identification) -> Verdict {
         warnings: warnings.into_iter().map(|w| w.message).collect(),
     }
 }
+
+/// Error over all joints of the worst log, percent, and on which logs it is one.
+fn relative_error(id: &Identification) -> (f64, &'static str) {
+    let worst = |errors: Vec<Option<f64>>| errors.into_iter().flatten().fold(f64::NAN, f64::max);
+    let unseen = id.unseen();
+    if unseen.is_empty() && !id.row_fits.is_empty() {
+        let of_rows = id.row_fits.iter().map(|rows| rows.fit.relative_error);
+        return (worst(of_rows.collect()), "reproduces the rows of the training logs");
+    }
+    let (logs, in_all, in_motion) = match unseen[..] {
+        [] => {
+            let motion = "reproduces the training logs where joints move";
+            (id.training.iter().collect(), "reproduces the training logs", motion)
+        }
+        _ => (unseen, "predicts logs it has not seen", "predicts logs it has not seen where joints move"),
+    };
+    // Friction at rest is nothing that a model of the speed could tell.
+    let rests = logs.iter().flat_map(|a| &a.standing_share).any(|share| *share > RESTS);
+    match rests {
+        true => (worst(logs.iter().map(|a| a.moving.relative_error).collect()), in_motion),
+        false => (worst(logs.iter().map(|a| a.filtered.relative_error).collect()), in_all),
+    }
+}
+
+/// Share of the samples at rest from which on the error of a log is that of the samples in motion.
+const RESTS: f64 = 0.25;
 
 /// Checks that did not pass and warnings, the worst first. A check that only sums up warnings, which stand for themselves, is
 /// left out.
@@ -216,18 +232,9 @@ fn condition(id: &Identification) -> CheckResult {
     )
 }
 
-/// Of samples in which the joint moves; of a joint that never does, of all.
-fn worst_r2(agreements: &[&Agreement]) -> Option<f64> {
-    agreements
-        .iter()
-        .flat_map(|a| {
-            a.moving.channels.iter().zip(&a.filtered.channels).filter_map(|(m, all)| m.r2.or(all.r2))
-        })
-        .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
-}
-
 fn fit_check(name: CheckName, agreements: &[&Agreement], where_: &str) -> CheckResult {
-    let worst = worst_r2(agreements);
+    let outputs = agreements.first().map_or(0, |a| a.moves.len());
+    let worst = (0..outputs).flat_map(|output| explained_in_motion(agreements, output)).reduce(f64::min);
     let r2 = worst.unwrap_or(f64::NAN);
     check(
         graded(r2 >= 0.9, r2 >= 0.5),
@@ -268,9 +275,9 @@ fn training_fit(id: &Identification) -> CheckResult {
 
 /// How well the rows of the training logs are explained, where these are all that is left of them.
 fn row_fit(id: &Identification) -> CheckResult {
-    let all = id.row_fits.iter().flat_map(|fit| {
-        let joints = fit.values.r2.iter().zip(dynid_model::EffortModel::outputs(&id.model));
-        joints.filter_map(|(r2, output)| Some(((*r2)?, &fit.log, &output.name)))
+    let all = id.row_fits.iter().flat_map(|rows| {
+        let joints = rows.fit.channels.iter().zip(dynid_model::EffortModel::outputs(&id.model));
+        joints.filter_map(|(channel, output)| Some((channel.r2?, &rows.log, &output.name)))
     });
     let worst = all.min_by(|a, b| a.0.total_cmp(&b.0));
     let r2 = worst.map_or(f64::NAN, |(r2, ..)| r2);

@@ -177,6 +177,45 @@ pub struct PositionNoise {
     pub velocity_variance: f64,
 }
 
+impl PositionNoise {
+    /// Noise and motion of one joint over several records, `(duration, noise)`: what a fit to all of them meets.
+    ///
+    /// Powers are means over time, so that a record in which the joint stands or creeps adds its noise and hardly any motion; the limit
+    /// follows from them anew ([`noise_limit`]). Crossing and band are those of the records in which the joint accelerates, each by its share of
+    /// the acceleration. One record gives its own figures. `None` without records.
+    pub fn pooled(records: &[(f64, PositionNoise)], noise_power: f64) -> Option<PositionNoise> {
+        let [.., (_, last)] = records else { return None };
+        if records.len() == 1 {
+            return Some(*last);
+        }
+        let total: f64 = records.iter().map(|(duration, _)| duration).sum();
+        let mean = |of: fn(&PositionNoise) -> f64| -> f64 {
+            records.iter().map(|(duration, noise)| duration / total * of(noise)).sum()
+        };
+        let floor_psd = mean(|noise| noise.floor_psd);
+        let acceleration_variance = mean(|noise| noise.acceleration_variance);
+        let moving = || {
+            records
+                .iter()
+                .filter_map(|(duration, n)| Some((duration * n.acceleration_variance, n, n.crossing_hz?)))
+        };
+        let accelerated: f64 = moving().map(|(power, ..)| power).sum();
+        let by_motion = |of: &dyn Fn(&PositionNoise, f64) -> f64| -> Option<f64> {
+            (accelerated > 0.0)
+                .then(|| moving().map(|(power, n, crossing)| power / accelerated * of(n, crossing)).sum())
+        };
+        Some(PositionNoise {
+            floor_psd,
+            sigma: mean(|noise| noise.sigma * noise.sigma).sqrt(),
+            crossing_hz: by_motion(&|_, crossing| crossing),
+            excited_band_hz: by_motion(&|n, _| n.excited_band_hz).unwrap_or(0.0),
+            noise_limit_hz: noise_limit(acceleration_variance, floor_psd, noise_power),
+            acceleration_variance,
+            velocity_variance: mean(|noise| noise.velocity_variance),
+        })
+    }
+}
+
 /// Reads the noise of a position from its second differences, `S_q = S_dd / (2 sin(pi f / fs))^4`, which keeps the
 /// leakage of the large slow motion out.
 ///

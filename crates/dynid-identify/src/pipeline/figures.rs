@@ -4,7 +4,7 @@ use dynid_estimate::linear::{LinearEstimate, LinearMethod};
 use dynid_rows::conditioning::{Conditioning, ReducedGroup};
 
 use crate::advice::FitRows;
-use crate::agreement::Agreement;
+use crate::agreement::{Agreement, explained_in_motion};
 use crate::consistency::{self, Consistent};
 use crate::trained_log::TrainedLog;
 
@@ -14,15 +14,14 @@ pub(crate) const EXPLAINED: f64 = 0.5;
 
 /// Per output: whether the model explains its effort, on logs that move the joint and on held-out folds.
 pub(crate) fn explained<'a>(
-    agreements: impl Iterator<Item = &'a Agreement> + Clone,
+    agreements: impl Iterator<Item = &'a Agreement>,
     outputs: usize,
     consistent: &Consistent,
 ) -> Vec<bool> {
-    // An effort that never changes has no R² and nothing to explain.
+    let agreements: Vec<&Agreement> = agreements.collect();
     (0..outputs)
         .map(|j| {
-            let moving = agreements.clone().filter(|a| a.moves[j]);
-            let logs = moving.filter_map(|a| a.filtered.channels[j].r2);
+            let logs = explained_in_motion(&agreements, j).into_iter();
             logs.chain(held_out_share(consistent, j)).all(|x| x >= EXPLAINED)
         })
         .collect()

@@ -1,13 +1,13 @@
 //! From factors to an identification.
 
 use dynid_estimate::linear::estimate;
+use dynid_estimate::metrics::{ChannelSums, FitSums};
 use dynid_factor::groups::ReducedGroup;
 
 use super::recipe::{Solved, training_log};
 use super::{LogFacts, Reduction, ReductionError};
 use crate::Error;
 use crate::consistency;
-use crate::estimate::FitValues;
 use crate::finding::Finding;
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::identification::Identification;
@@ -88,8 +88,9 @@ impl Reduction {
             out.validate(log)?;
         }
         progress(Step::Trust);
-        let rows =
-            |j: usize| row_fits.iter().filter_map(move |fit| fit.values.r2[j]).all(|r2| r2 >= EXPLAINED);
+        let rows = |j: usize| {
+            row_fits.iter().filter_map(move |rows| rows.fit.channels[j].r2).all(|r2| r2 >= EXPLAINED)
+        };
         let samples = explained(out.validation.iter(), self.recipe.outputs.len(), &out.consistent);
         out.explained = samples.into_iter().enumerate().map(|(j, held)| held && rows(j)).collect();
         out.recipe_doubts.clone_from(&self.recipe.doubts);
@@ -101,26 +102,23 @@ impl Reduction {
 
 /// How well the rows of a log are explained by values in base columns.
 fn row_fit(facts: &LogFacts, groups: &[ReducedGroup], x: &[f64], outputs: usize) -> RowFit {
-    let mut values = FitValues::unknown(outputs);
-    let (mut residual, mut squares, mut rows) = (0.0, 0.0, 0);
+    let mut of_outputs = vec![ChannelSums::default(); outputs];
     for group in groups.iter().filter(|g| g.scale == 0 && g.rows() > 0) {
         let (j, n) = (group.output, group.rows() as f64);
-        let rss = group.merged(x.len()).rss(x);
-        let sums = &facts.efforts[j];
-        residual += rss;
-        squares += sums.squares;
-        rows += group.rows();
-        let rms = (rss / n).sqrt();
-        let about_mean = sums.squares - sums.sum * sums.sum / n;
-        let range = sums.greatest - sums.least;
-        values.rms[j] = Some(rms);
-        values.nrmse[j] = (range > 0.0).then(|| rms / range);
+        let efforts = &facts.efforts[j];
+        let about_mean = efforts.squares - efforts.sum * efforts.sum / n;
         // Rows of a joint at rest hold friction that no model of the speed tells.
-        values.r2[j] =
-            (facts.log.moves[j] && about_mean > 1e-12 * sums.squares).then(|| 1.0 - rss / about_mean);
-        values.relative_error_per_joint[j] =
-            (sums.squares > 0.0).then(|| 100.0 * (rss / sums.squares).sqrt());
+        let varies = facts.log.moves[j] && about_mean > 1e-12 * efforts.squares;
+        of_outputs[j] = ChannelSums {
+            samples: group.rows(),
+            error_energy: group.merged(x.len()).rss(x),
+            energy: efforts.squares,
+            variation: if varies { about_mean } else { 0.0 },
+            range: (efforts.greatest - efforts.least).max(0.0),
+            ..ChannelSums::default()
+        };
     }
-    values.relative_error = (squares > 0.0).then(|| 100.0 * (residual / squares).sqrt());
-    RowFit { log: facts.name.clone(), rows, values }
+    let mut sums = FitSums::default();
+    of_outputs.iter().for_each(|of_output| sums.add(of_output, true));
+    RowFit { log: facts.name.clone(), fit: sums.fit() }
 }

@@ -2,6 +2,7 @@
 
 use dynid_motion::cutoff::{KernelLimit, kernel_candidates, kernel_limit};
 use dynid_motion::median::median;
+use dynid_motion::spectrum::PositionNoise;
 use rayon::prelude::*;
 
 use super::trial::{Choice, PROBES, Trial};
@@ -48,24 +49,31 @@ pub struct DelayEstimate {
     pub given: bool,
 }
 
-/// Highest kernel that noise and band of all logs allow: the lowest over logs.
+/// Highest kernel that noise and band allow: of what all logs together show of every joint, so that a log in which a joint stands or creeps
+/// takes no part of the motion of others away. Logs with a stated period, whose states hold next to no noise, count apart; the lower
+/// of both holds.
 pub(crate) fn limit(
     logs: &[PreparedLog],
     settings: &ConditioningSettings,
 ) -> Result<KernelLimit, ConditioningError> {
-    let mut lowest: Option<KernelLimit> = None;
-    for log in logs {
-        let Some(mut limit) = kernel_limit(&log.position_noise, log.rate_hz, &settings.cutoff) else {
-            continue;
+    let of = |periodic: bool| {
+        let logs: Vec<&PreparedLog> = logs.iter().filter(|log| log.periodic.is_some() == periodic).collect();
+        let rate_hz = logs.iter().map(|log| log.rate_hz).fold(f64::INFINITY, f64::min);
+        let outputs = logs.first().map_or(0, |log| log.position_noise.len());
+        let pooled = |output: usize| {
+            let records: Vec<_> =
+                logs.iter().map(|log| (log.duration(), log.position_noise[output])).collect();
+            PositionNoise::pooled(&records, settings.noise.noise_power)
         };
-        if log.periodic.is_some() {
-            let most = settings.cutoff.kernel_rate * log.rate_hz;
+        let noise: Vec<PositionNoise> = (0..outputs).filter_map(pooled).collect();
+        let mut limit = kernel_limit(&noise, rate_hz, &settings.cutoff)?;
+        if periodic {
+            let most = settings.cutoff.kernel_rate * rate_hz;
             limit.limit_hz = limit.limit_hz.max(settings.periodic_kernel_hz.min(most));
         }
-        if lowest.as_ref().is_none_or(|l| limit.limit_hz < l.limit_hz) {
-            lowest = Some(limit);
-        }
-    }
+        Some(limit)
+    };
+    let lowest = [of(false), of(true)].into_iter().flatten().min_by(|a, b| a.limit_hz.total_cmp(&b.limit_hz));
     lowest.ok_or_else(|| ConditioningError::NothingMoves {
         log: logs.first().map_or_else(String::new, |l| l.name.clone()),
     })

@@ -3,11 +3,8 @@
 use dynid_motion::mask::reversal_threshold;
 use rayon::prelude::*;
 
-use super::states::States;
+use super::states::{LEAST_SHARE, States};
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
-
-/// Least speed of a joint that moves, as a share of its rms speed: the first rung of the usual ladder of reversal masks.
-const LEAST_SHARE: f64 = 0.03;
 
 /// Where the joints of a log move.
 ///

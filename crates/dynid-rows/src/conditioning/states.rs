@@ -357,12 +357,19 @@ impl BadSamples {
     }
 }
 
+/// Least speed of a joint that moves, as a share of its rms speed: the first rung of the usual ladder of reversal masks.
+pub(super) const LEAST_SHARE: f64 = 0.03;
+/// Speed, rad/s or m/s, up to which a joint stands however quiet its encoder: the filter of a constant position leaves its rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// For one output of one log: bad samples of the clock, and of reversal at every rung of the ladder.
 #[derive(Debug, Clone)]
 pub(crate) struct Masks {
     clock: BadSamples,
     /// First entry: no reversal mask; then one per rung.
     reversal: Vec<Option<BadSamples>>,
+    /// Samples in which the output moves.
+    moving: usize,
 }
 
 impl Masks {
@@ -383,18 +390,29 @@ impl Masks {
             .enumerate()
             .map(|(k, (v, sigma))| (v, *sigma, rms_of(k, v), near_reversal(v, 0.0)))
             .collect();
+        let moves = |n: usize| {
+            speeds.iter().all(|(v, sigma, rms, _)| {
+                v[n].abs() >= threshold_at(*rms, *sigma, settings.stick_sigma, LEAST_SHARE).max(ROUNDING)
+            })
+        };
+        let moving = (0..states.samples).filter(|n| moves(*n)).count();
         let mut reversal = vec![None];
         for level in &settings.ladder {
             let mut bad = vec![false; states.samples];
             for (v, sigma, rms, changes) in &speeds {
-                let threshold = threshold_at(*rms, *sigma, settings.stick_sigma, *level);
+                let threshold = threshold_at(*rms, *sigma, settings.stick_sigma, *level).max(ROUNDING);
                 for ((b, v), changes) in bad.iter_mut().zip(*v).zip(changes) {
                     *b |= *changes | (v.abs() < threshold);
                 }
             }
             reversal.push(Some(BadSamples::new(bad.into_iter())));
         }
-        Masks { clock: BadSamples::new(log.usable.iter().map(|u| !u)), reversal }
+        Masks { clock: BadSamples::new(log.usable.iter().map(|u| !u)), reversal, moving }
+    }
+
+    /// Samples in which the output moves.
+    pub(crate) fn moving(&self) -> usize {
+        self.moving
     }
 
     /// Number of rungs, counting "no mask".

@@ -22,6 +22,8 @@ pub(crate) struct Trial {
     classes: Vec<Classes>,
     /// Per output and rung: share of samples that stay usable.
     pub(crate) coverage: Vec<Vec<f64>>,
+    /// Per output: share of samples in which it moves.
+    moving: Vec<f64>,
     folds: usize,
 }
 
@@ -52,24 +54,32 @@ pub(crate) enum TrialShapes<'a> {
 }
 
 impl TrialShapes<'_> {
-    fn of_log(self, states: &States) -> Vec<Vec<FrictionShape>> {
+    /// The shapes of every output, the same in all logs: their columns are one unknown.
+    fn of_logs(self, logs: &[PreparedLog], outputs: usize) -> Vec<Vec<FrictionShape>> {
         match self {
             TrialShapes::Library { shapes, .. } => shapes.to_vec(),
-            TrialShapes::Probes => (0..states.outputs())
-                .into_par_iter()
-                .map(|output| {
-                    let rms = dynid_motion::signal::rms(&states.velocity(output)).max(f64::MIN_POSITIVE);
-                    [
-                        (ShapeKind::ViscousMagnitude, 1.0),
-                        (ShapeKind::Stribeck, 0.25 * rms),
-                        (ShapeKind::Tanh, rms),
-                    ]
-                    .map(|(kind, value)| FrictionShape { kind, value })
-                    .to_vec()
-                })
-                .collect(),
+            TrialShapes::Probes => (0..outputs).map(|output| probes(rms_speed(logs, output))).collect(),
         }
     }
+}
+
+fn probes(rms_speed: f64) -> Vec<FrictionShape> {
+    let shapes = [
+        (ShapeKind::ViscousMagnitude, 1.0),
+        (ShapeKind::Stribeck, 0.25 * rms_speed),
+        (ShapeKind::Tanh, rms_speed),
+    ];
+    shapes.map(|(kind, value)| FrictionShape { kind, value }).to_vec()
+}
+
+/// Root mean square speed of an output over the logs that move it; 1 rad/s or m/s where none does.
+fn rms_speed(logs: &[PreparedLog], output: usize) -> f64 {
+    let (mut square, mut seconds) = (0.0, 0.0);
+    for log in logs.iter().filter(|log| log.moves[output]) {
+        square += log.duration() * log.position_noise[output].velocity_variance;
+        seconds += log.duration();
+    }
+    if square > 0.0 { (square / seconds).sqrt() } else { 1.0 }
 }
 
 impl Trial {
@@ -94,12 +104,13 @@ impl Trial {
         };
         let mut classes: Vec<Classes> = vec![Classes::new(); outputs];
         let mut coverage: Vec<Vec<f64>> = vec![Vec::new(); outputs];
+        let mut moving = vec![0.0; outputs];
         let mut state_hz = Vec::new();
         let slowest = logs.iter().map(|l| l.rate_hz).fold(f64::INFINITY, f64::min);
         let scales_hz = scales(kernel_hz, limit, slowest, settings);
         let lags = Lags::new(delay_limits.0, delay_limits.1, kernel_hz, slowest);
         let total: f64 = logs.iter().map(|l| l.samples() as f64).sum();
-        let mut shape_counts = vec![0; outputs];
+        let shapes = shapes.of_logs(logs, outputs);
         for log in logs {
             let cutoff = state_hz_of(kernel_hz, limit, log.rate_hz, settings);
             state_hz.push(cutoff);
@@ -108,6 +119,7 @@ impl Trial {
             let kernels = Kernels::new(&scales_hz, &states, lags.reach())?;
             for (output, mask) in masks.iter().enumerate() {
                 let share = log.samples() as f64 / total;
+                moving[output] += mask.moving() as f64 / total;
                 let own = kernels.coverage(mask, log.samples());
                 coverage[output].resize(own.len(), 0.0);
                 for (c, o) in coverage[output].iter_mut().zip(own) {
@@ -118,8 +130,6 @@ impl Trial {
                 .map(|j| GramConsumer::new(log, &states.effort[j], &kernels.kernels, lags, settings.folds))
                 .collect();
             let wanted = vec![u8::MAX; outputs];
-            let shapes = shapes.of_log(&states);
-            shape_counts = shapes.iter().map(Vec::len).collect();
             Pass {
                 load,
                 model,
@@ -147,9 +157,10 @@ impl Trial {
             scales_hz,
             lags,
             columns,
-            shapes: shape_counts,
+            shapes: shapes.iter().map(Vec::len).collect(),
             classes,
             coverage,
+            moving,
             folds: settings.folds,
         })
     }
@@ -167,9 +178,11 @@ impl Trial {
         self.folds
     }
 
-    /// The strictest rung of an output, not stricter than asked for, that keeps the wanted share of samples.
+    /// The strictest rung of an output, not stricter than asked for, that keeps the wanted share of the samples in which it moves: those in
+    /// which it stands are no motion that a mask could keep.
     pub(crate) fn allowed(&self, output: usize, rung: usize, least: f64) -> usize {
-        (0..=rung).rev().find(|r| self.coverage[output][*r] >= least).unwrap_or(0)
+        let least = least * self.moving[output];
+        (0..=rung).rev().find(|r| least > 0.0 && self.coverage[output][*r] >= least).unwrap_or(0)
     }
 
     /// Place of an output's first friction shape among the unknowns: base columns come first, then the shapes of all
@@ -239,6 +252,7 @@ impl Trial {
             shapes: shapes.iter().map(Vec::len).collect(),
             classes,
             coverage: self.coverage.clone(),
+            moving: self.moving.clone(),
             folds: self.folds,
         }
     }
