@@ -42,7 +42,7 @@ pub struct Agreement {
     pub predicted: Vec<Arc<Vec<f64>>>,
     /// Per output: where the prediction that pictures show differs; empty before [`Agreement::draw`].
     drawn: Vec<Patches>,
-    /// Per output: a drive acts there, so that its effort counts in figures over all joints.
+    /// Per output: a drive acts there and moves the joint or holds it, so that its effort counts in figures over all joints.
     pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
     pub moves: Vec<bool>,
@@ -108,7 +108,8 @@ pub fn compare(
     let predicted = predict_along(model, &shape, values, log, &states);
     drop(states);
     let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
-    let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
+    let driven: Vec<bool> =
+        (0..log.effort.len()).map(|output| !model.is_undriven(output) && !log.held[output]).collect();
     let of_output = |(output, unaligned): (usize, Vec<f64>)| -> Result<(Vec<f64>, [ChannelSums; 5]), Error> {
         let measured = &log.effort[output];
         let agree = |measured: &[f64], predicted: &[f64], part: Part| {

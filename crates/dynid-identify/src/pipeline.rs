@@ -18,7 +18,9 @@ use dynid_estimate::identifiability::VisibleSpace;
 use dynid_linalg::Mat;
 use dynid_model::element::scale_name;
 use dynid_model::{EffortModel, RobotModel};
-use dynid_rows::conditioning::{PreparedLog, ReducedGroup, tell_shared_motions};
+use dynid_rows::conditioning::{
+    ConditioningError, PreparedLog, ReducedGroup, tell_shared_motions, tell_speeds,
+};
 
 use crate::caution::{self, Caution};
 use crate::check::CheckName;
@@ -522,8 +524,15 @@ pub fn open(
         read.push(ReadLog { warnings, source: log.source });
     }
     tell_shared_motions(&mut prepared);
+    tell_speeds(&mut prepared);
     for log in &prepared {
         settings.check_cutoffs(&log.name, log.rate_hz)?;
+    }
+    for (output, of_joint) in model.outputs().iter().enumerate() {
+        if prepared.iter().all(|log| log.held[output]) {
+            let (log, joint) = (prepared[0].name.clone(), of_joint.name.clone());
+            return Err(ConditioningError::ConstantEffort { log, joint }.into());
+        }
     }
     // What cannot be prepared says so in its own words.
     let findings = findings?;

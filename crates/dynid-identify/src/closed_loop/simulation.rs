@@ -8,7 +8,7 @@ use dynid_factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{RowSource, reduce_rows};
 use dynid_model::{EffortModel, RobotModel};
-use dynid_rows::conditioning::{LogRows, paired_textbook_rows};
+use dynid_rows::conditioning::{ConditioningError, LogRows, paired_textbook_rows};
 use dynid_sim::{
     ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, SimError, Truth, Wanted, run,
 };
@@ -81,6 +81,11 @@ impl<'a> Bench<'a> {
                 "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \
                  state other friction (`elements.friction`) or leave out `[instruments]`"
             )));
+        }
+        let held = logs.iter().find_map(|log| Some((log, log.held.iter().position(|held| *held)?)));
+        if let Some((log, output)) = held {
+            let (log, joint) = (log.name.clone(), model.outputs()[output].name.clone());
+            return Err(ConditioningError::ConstantEffort { log, joint }.into());
         }
         let references = training
             .iter()

@@ -16,6 +16,8 @@ use crate::{Error, advice};
 /// Share of the farthest travel of a joint of its kind below which a joint stands still: more than degrees taken for radians
 /// make of it.
 const STILL: f64 = 1e-3;
+/// Travel up to which a turning joint that a controller holds may be pushed about by the others, rad, and as a share of the farthest travel.
+const PUSHED: (f64, f64) = (0.01, 0.01);
 /// Share of the efforts' power (root) left unexplained above which a model explains too little to judge by.
 pub(super) const UNEXPLAINED: f64 = 0.5;
 
@@ -101,7 +103,8 @@ impl Bench {
             let (own, largest) = (*own, alike.map(|(_, (travel, _))| *travel).fold(0.0, f64::max));
             let evidence = if !moves {
                 "the position does not leave its resolution and noise".to_owned()
-            } else if own < STILL * largest {
+            } else if own < STILL * largest || !slides(&joint.name) && own < PUSHED.0.min(PUSHED.1 * largest)
+            {
                 let unit = if slides(&joint.name) { "m" } else { "rad" };
                 format!(
                     "the position moves by {own:.1e} {unit}, that of another joint by {largest:.1e} {unit}"
@@ -110,7 +113,15 @@ impl Bench {
                 continue;
             };
             idle.push(joint.name.clone());
-            if !joint.effort_is_constant() {
+            if joint.effort_is_constant() && !joint.effort.is_empty() && self.drives(&joint.name) {
+                let evidence = format!(
+                    "{evidence}, and its effort is {} in every row: something else than its drive holds it, such as a brake, and its rows do not \
+                     count",
+                    joint.effort[0]
+                );
+                let remedy = "nothing, if other logs move this joint; else log its effort, or hold it: `NAME = POSITION` under `[locked]`";
+                out.add(FindingId::IdleJoint, Severity::Warning, Some(&joint.name), evidence, remedy);
+            } else if !joint.effort_is_constant() {
                 let remedy = "friction, drive and most inertias of this joint cannot be seen in this log; add one in which it moves";
                 out.add(FindingId::IdleJoint, Severity::Warning, Some(&joint.name), evidence, remedy);
             }

@@ -64,8 +64,8 @@ pub(super) fn examine(
             continue;
         }
         if joint.effort_is_constant() {
-            // Where no drive acts there is no effort.
-            if driven(&joint.name) {
+            // Where no drive acts there is no effort; where nothing moves, a brake may hold.
+            if driven(&joint.name) && joint.moves() {
                 let evidence = format!("the effort is {} in every row", joint.effort[0]);
                 out.add(
                     FindingId::FrozenSignal,

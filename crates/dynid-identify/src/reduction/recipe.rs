@@ -152,6 +152,9 @@ pub struct Choices {
     pub mask: Vec<Option<f64>>,
     /// Per output: share of samples that stay usable.
     usable: Vec<f64>,
+    /// Per output: rms speed in the log in which it is greatest, rad/s or m/s; empty in files of before that was told.
+    #[serde(default)]
+    pub(super) rms_speed: Vec<f64>,
 }
 
 /// Time blocks behind standard deviations.
@@ -406,9 +409,13 @@ impl Recipe {
         let numbers = [*kernel_hz, *rate_hz].iter().chain(scales_hz).all(|x| x.is_finite() && *x > 0.0);
         let per_output =
             [rung.len(), mask.len(), usable.len(), self.velocities.len()].iter().all(|n| *n == outputs);
+        let speeds = &self.choices.rms_speed;
+        let speeds =
+            speeds.is_empty() || speeds.len() == outputs && speeds.iter().all(|v| v.is_finite() && *v >= 0.0);
         let ladder = self.settings.settings().conditioning_settings().ladder.len();
         if !numbers
             || !per_output
+            || !speeds
             || scales_hz.is_empty()
             || !delay_samples.is_finite()
             || delay_samples.abs() > 1e6
@@ -455,6 +462,7 @@ impl Recipe {
             rung: c.rung.clone(),
             mask: c.mask.clone(),
             usable: c.usable.clone(),
+            rms_speed: c.rms_speed.clone(),
             kernel_trials: Vec::new(),
             mask_trials: Vec::new(),
         }
@@ -539,6 +547,7 @@ impl Choices {
             rung: found.rung.clone(),
             mask: found.mask.clone(),
             usable: found.usable.clone(),
+            rms_speed: found.rms_speed.clone(),
         }
     }
 }

@@ -139,7 +139,10 @@ impl Reducer {
             most_blocks: Some(self.recipe.blocks.most),
             ..settings.conditioning_settings()
         };
-        let prepared = log.prepare(model, &conditioned)?;
+        let mut prepared = log.prepare(model, &conditioned)?;
+        if !self.recipe.choices.rms_speed.is_empty() {
+            prepared.tell_speeds(&self.recipe.choices.rms_speed);
+        }
         let (expected_hz, found_hz) = (self.recipe.choices.rate_hz, prepared.rate_hz);
         if (found_hz / expected_hz - 1.0).abs() > 0.05 {
             return Err(ReductionError::Rate { log: prepared.name, expected_hz, found_hz }.into());

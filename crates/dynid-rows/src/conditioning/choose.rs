@@ -273,8 +273,10 @@ pub(crate) fn masks(
 ) -> (Vec<usize>, Vec<MaskTrial>) {
     let outputs = trial.outputs();
     let rungs = settings.ladder.len() + 1;
+    // Rows of a joint at rest hold friction of any size: of one that rests for long they, not the mask, have to prove their gain.
     let at = |rung: usize| -> Vec<usize> {
-        (0..outputs).map(|j| trial.allowed(j, rung, settings.least_usable)).collect()
+        let least = |j: usize| usize::from(trial.rests(j));
+        (0..outputs).map(|j| trial.allowed(j, rung.max(least(j)), settings.least_usable)).collect()
     };
     // Losses are compared on rows that every rung has: those of the strictest one that keeps half of the samples.
     let rows_at: Vec<usize> = (0..outputs).map(|j| trial.allowed(j, rungs - 1, 0.5)).collect();
@@ -287,8 +289,11 @@ pub(crate) fn masks(
     };
 
     if let Some(level) = settings.reversal_mask {
-        let rung = if level < 0.0 { 0 } else { rungs - 1 };
-        return (at(rung), Vec::new());
+        let rung = |j: usize| match level < 0.0 {
+            true => 0,
+            false => trial.allowed(j, rungs - 1, settings.least_usable),
+        };
+        return ((0..outputs).map(rung).collect(), Vec::new());
     }
     let ladder: Vec<Vec<f64>> = (0..rungs).map(|r| score(at(r))).collect();
     let smallest = ladder.iter().map(|l| mean(l)).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
@@ -316,7 +321,11 @@ pub(crate) fn masks(
             let mut changed = current.clone();
             changed[output] = rung;
             let values = score(changed.clone());
-            if wins(&current_losses, &values, settings.mask_sigma.1) {
+            let sigmas = match rung {
+                0 if trial.rests(output) => 0.0,
+                _ => settings.mask_sigma.1,
+            };
+            if wins(&current_losses, &values, sigmas) {
                 current = changed;
                 current_losses = values;
             }

@@ -4,8 +4,9 @@ use dynid_model::EffortModel;
 use dynid_motion::{Kernel, shift};
 use rayon::prelude::*;
 
+use super::masks::Masks;
 use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
-use super::states::{Masks, States};
+use super::states::States;
 use super::windows::means;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_estimate::instruments::paired_columns;

@@ -11,6 +11,7 @@ mod friction_shape;
 mod gram;
 mod live_rows;
 mod log_rows;
+mod masks;
 mod moving;
 mod periodic;
 mod predict;
@@ -34,7 +35,7 @@ pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
 pub use friction_shape::{FrictionShape, ShapeKind};
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::{LogRows, least_block_samples, most_blocks, time_blocks};
-pub use moving::Moving;
+pub use moving::{Moving, rms_speeds, tell_speeds};
 pub use predict::{predict, predict_along};
 pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, SharedMotion, prepare};
 pub use record_windows::{RecordFigures, Window};
@@ -190,6 +191,8 @@ pub struct Conditioning {
     pub mask: Vec<Option<f64>>,
     /// Per output: share of samples that stay usable.
     pub usable: Vec<f64>,
+    /// Per output: rms speed in the log in which it is greatest ([`rms_speeds`]).
+    pub rms_speed: Vec<f64>,
     /// Kernels tried.
     pub kernel_trials: Vec<KernelTrial>,
     /// Ladder of masks.
@@ -288,6 +291,7 @@ pub fn condition(
         rung,
         mask,
         usable,
+        rms_speed: rms_speeds(logs),
         kernel_trials,
         mask_trials,
         limit,

@@ -43,6 +43,11 @@ pub struct PreparedLog {
     pub spike_levels: Vec<[SpikeLevel; 2]>,
     /// Per output: whether the joint moves in this log.
     pub moves: Vec<bool>,
+    /// Per output: whether something else than its drive holds the joint in this log, such as its brake: it does not move, and its effort
+    /// never changes. Its rows tell nothing and do not count.
+    pub held: Vec<bool>,
+    /// Per output: by how much its rms speed in another log is above that in this one, rad/s or m/s; zeros before [`tell_speeds`](super::tell_speeds).
+    pub outpaced: Vec<f64>,
     /// Per output: root mean squares of its reversal speeds behind the masks; `None`: those of the samples at hand.
     pub speed_rms: Option<Arc<Vec<Vec<f64>>>>,
     /// What was found about the clock.
@@ -108,8 +113,8 @@ impl PreparedLog {
 
 /// Puts a log on a uniform grid, removes spikes, measures noise and band.
 ///
-/// Fails if a joint of the model is not logged, its effort never changes though a drive acts on it, a channel is missing, or the clock is beyond
-/// repair.
+/// Fails if a joint of the model is not logged, it moves and its effort never changes though a drive acts on it, a channel is missing, or the
+/// clock is beyond repair.
 pub fn prepare(
     log: &Log,
     model: &dyn EffortModel,
@@ -122,12 +127,15 @@ pub fn prepare(
         }
     }
     let mut joints = Vec::with_capacity(model.outputs().len());
+    let mut held = Vec::with_capacity(model.outputs().len());
     for (number, output) in model.outputs().iter().enumerate() {
         let Some(index) = uniform.joints.iter().position(|j| j.name == output.name) else {
             return Err(ConditioningError::MissingJoint { log: uniform.name, joint: output.name.clone() });
         };
         let joint = uniform.joints.swap_remove(index);
-        if joint.effort_is_constant() && !model.is_undriven(number) {
+        let constant = joint.effort_is_constant() && !model.is_undriven(number);
+        held.push(constant && !joint.moves());
+        if constant && joint.moves() {
             return Err(ConditioningError::ConstantEffort { log: uniform.name, joint: joint.name });
         }
         joints.push(joint);
@@ -167,6 +175,8 @@ pub fn prepare(
         spikes: Vec::new(),
         spike_levels: Vec::new(),
         moves: Vec::new(),
+        outpaced: vec![0.0; held.len()],
+        held,
         speed_rms: None,
         clock: uniform.report,
         repeats_after: None,

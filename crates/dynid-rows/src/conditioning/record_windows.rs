@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use dynid_model::EffortModel;
+use dynid_motion::log::moves;
 use dynid_motion::signal::rms;
 use dynid_motion::spectrum::{EffortNoise, PositionNoise};
 use dynid_motion::spikes::{self, SpikeLevel};
@@ -23,6 +24,8 @@ pub struct RecordFigures {
     position_noise: Vec<PositionNoise>,
     effort_noise: Vec<EffortNoise>,
     spikes: Vec<[SpikeLevel; 2]>,
+    held: Vec<bool>,
+    outpaced: Vec<f64>,
     speed_rms: Arc<Vec<Vec<f64>>>,
 }
 
@@ -60,6 +63,8 @@ impl RecordFigures {
             position_noise: part.position_noise.clone(),
             effort_noise: part.effort_noise.clone(),
             spikes: part.spike_levels.clone(),
+            held: part.held.clone(),
+            outpaced: part.outpaced.clone(),
             speed_rms: Arc::new((0..model.outputs().len()).into_par_iter().map(of_output).collect()),
         })
     }
@@ -123,11 +128,18 @@ impl PreparedLog {
                 })
                 .collect::<Result<_, ConditioningError>>()?;
         }
+        // A joint that was held may move later.
+        let still = |output: usize| {
+            !moves(&position[output]) && effort[output].windows(2).all(|pair| pair[0] == pair[1])
+        };
+        let held = figures.held.iter().enumerate().map(|(output, held)| *held && still(output)).collect();
         Ok(PreparedLog {
             name: name.to_owned(),
             start: 0.0,
             rate_hz: figures.clock.rate_hz,
             moves: vec![true; position.len()],
+            held,
+            outpaced: figures.outpaced.clone(),
             position,
             effort: effort.into_iter().map(Arc::new).collect(),
             channels,

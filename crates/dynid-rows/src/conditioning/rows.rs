@@ -7,7 +7,8 @@ use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
 use super::friction_shape::{FrictionShape, ShapeKind};
-use super::states::{Masks, States};
+use super::masks::Masks;
+use super::states::States;
 use super::windows::add_windows;
 use super::{ConditioningSettings, PreparedLog};
 use dynid_factor::rows::RowsError;

@@ -179,7 +179,7 @@ fn rows_of<'a>(
             });
             for start in (0..effort.len()).step_by(per_block) {
                 let end = (start + per_block).min(effort.len());
-                let used: Vec<usize> = (start..end).filter(|k| usable[*k]).collect();
+                let used: Vec<usize> = (start..end).filter(|k| usable[*k] && !log.held[output]).collect();
                 let of = |signal: &[f64]| used.iter().map(|k| signal[*k]).collect::<Vec<f64>>();
                 let samples: Vec<usize> = used.iter().map(|k| inside.start + k * factor).collect();
                 let regressor: Vec<f64> = thinned.iter().flat_map(|column| of(column)).collect();

@@ -178,6 +178,11 @@ impl Trial {
         self.folds
     }
 
+    /// Whether a joint rests for a quarter of the time or longer.
+    pub(crate) fn rests(&self, output: usize) -> bool {
+        self.moving[output] <= 0.75
+    }
+
     /// The strictest rung of an output, not stricter than asked for, that keeps the wanted share of the samples in which it moves: those in
     /// which it stands are no motion that a mask could keep.
     pub(crate) fn allowed(&self, output: usize, rung: usize, least: f64) -> usize {

@@ -128,6 +128,11 @@ impl Problem<'_> {
                 Some(x) => x,
                 None => solve(&self.parts(&block, &columns, &wiring, &[], 1)?, None, &self.prior, 0).x,
             };
+            // Rows that outweigh the prior by all digits leave a triangle that is singular.
+            let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
+            if !finite(&x) {
+                return Ok(None);
+            }
             // What the unknown does to every effort, per unit.
             let changes: Vec<Vec<Vec<f64>>> = (0..unknown.count())
                 .map(|k| {
@@ -146,7 +151,7 @@ impl Problem<'_> {
                 return Ok(None);
             }
             let Solved { x, more, misfit } = solve(&parts, None, &self.prior, unknown.count());
-            if misfit > worth {
+            if misfit > worth || !finite(&more) {
                 return Ok(None);
             }
             let step: Vec<f64> = more.iter().map(|s| s.clamp(-LONGEST, LONGEST)).collect();

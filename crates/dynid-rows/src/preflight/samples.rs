@@ -71,9 +71,10 @@ impl Samples {
     /// Unless there is one entry of `moves` per joint.
     pub fn new(log: &UniformLog, moves: &[bool]) -> Result<Option<Samples>, SignalError> {
         assert_eq!(moves.len(), log.joints.len(), "one entry of moves per joint");
-        let noise = log
-            .joints
-            .par_iter()
+        let moving: Vec<_> =
+            log.joints.iter().zip(moves).filter(|(_, moves)| **moves).map(|(j, _)| j).collect();
+        let noise = moving
+            .into_par_iter()
             .map(|j| position_noise(&j.position, log.rate_hz, &NoiseSettings::default()))
             .collect::<Result<Vec<_>, _>>()?;
         let Some(limit) = kernel_limit(&noise, log.rate_hz, &CutoffSettings::default()) else {
@@ -120,7 +121,8 @@ impl Samples {
                     acceleration: pick(&acceleration),
                     effort: pick(&effort),
                     whole_effort: Arc::new(effort),
-                    sliding: kept.iter().map(|k| !reversing[*k]).collect(),
+                    // At rest friction has any value, and rows would weigh as much as the effort is steady.
+                    sliding: kept.iter().map(|k| *moves && !reversing[*k]).collect(),
                     moves: *moves,
                 })
             })
