@@ -312,6 +312,14 @@ pub(crate) fn masks(
 
     let mut current = at(best);
     let mut current_losses = ladder[best].clone();
+    if (0..outputs).any(|j| trial.rests(j)) {
+        let with_rest = vec![0; outputs];
+        let values = score(with_rest.clone());
+        if wins(&current_losses, &values, settings.mask_sigma.0) {
+            current = with_rest;
+            current_losses = values;
+        }
+    }
     for output in 0..outputs {
         for rung in 0..rungs {
             let allowed = trial.allowed(output, rung, settings.least_usable);
@@ -321,11 +329,7 @@ pub(crate) fn masks(
             let mut changed = current.clone();
             changed[output] = rung;
             let values = score(changed.clone());
-            let sigmas = match rung {
-                0 if trial.rests(output) => 0.0,
-                _ => settings.mask_sigma.1,
-            };
-            if wins(&current_losses, &values, sigmas) {
+            if wins(&current_losses, &values, settings.mask_sigma.1) {
                 current = changed;
                 current_losses = values;
             }
