@@ -134,6 +134,7 @@ pub fn kernel_scales(kernel_hz: f64, state_hz: f64, rate_hz: f64, settings: &Cut
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectrum::noise_limit;
 
     fn noise(limit: f64, crossing: Option<f64>, band: f64) -> PositionNoise {
         PositionNoise {
@@ -158,6 +159,31 @@ mod tests {
         assert_eq!(both.per_joint_hz[1], 0.0);
         assert!(kernel_limit(&[rest], 500.0, &settings).is_none());
         assert!(kernel_limit(&[], 500.0, &settings).is_none());
+    }
+
+    /// A record in which a joint creeps takes none of the band of another away, and adds its noise to it.
+    #[test]
+    fn records_of_slow_motion_do_not_pull_the_limit_down() {
+        let fast =
+            PositionNoise { noise_limit_hz: noise_limit(1.0, 1e-12, 5e-5), ..noise(0.0, Some(20.0), 0.5) };
+        let slow = PositionNoise {
+            acceleration_variance: 1e-8,
+            velocity_variance: 1e-4,
+            noise_limit_hz: noise_limit(1e-8, 1e-12, 5e-5),
+            ..noise(0.0, Some(0.3), 0.05)
+        };
+        let pooled = |records: &[(f64, PositionNoise)]| PositionNoise::pooled(records, 5e-5).unwrap();
+        assert_eq!(pooled(&[(30.0, fast)]), fast);
+        let both = pooled(&[(30.0, fast), (30.0, slow)]);
+        assert!((both.acceleration_variance / 0.5 - 1.0).abs() < 1e-6 && both.floor_psd == 1e-12);
+        assert!((both.noise_limit_hz / fast.noise_limit_hz - 0.5_f64.powf(0.2)).abs() < 1e-6);
+        assert!((both.crossing_hz.unwrap() - 20.0).abs() < 1e-5 && (both.excited_band_hz - 0.5).abs() < 1e-6);
+        // Twice the same is once the same.
+        let twice = pooled(&[(30.0, fast), (10.0, fast)]);
+        assert!((twice.noise_limit_hz / fast.noise_limit_hz - 1.0).abs() < 1e-12);
+        let still = PositionNoise { crossing_hz: None, acceleration_variance: 0.0, ..slow };
+        assert_eq!(pooled(&[(1.0, still), (1.0, still)]).crossing_hz, None);
+        assert!(PositionNoise::pooled(&[], 5e-5).is_none());
     }
 
     #[test]

@@ -39,6 +39,7 @@ mod reduce;
 mod reduce_long;
 mod repeated_motions;
 mod report_page;
+mod resting;
 mod safe_designs;
 mod servo;
 mod settings;

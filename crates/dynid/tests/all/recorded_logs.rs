@@ -51,6 +51,23 @@ fn ur10e() {
     check("ur10e-innopolis", UR10E, 58, 8.0, &[2.74, 4.22, 1.87, 0.376, 0.471, 0.407], 0.75);
 }
 
+/// Logs of one joint at a time, six times as long as the others together, in which the rest holds still by friction.
+#[test]
+fn ur10e_with_logs_of_single_joints() {
+    let single =
+        |joint| format!("[[log]]\npath = \"{{data}}/ur10e-innopolis/20_01_22-joint_{joint}.csv.gz\"\n");
+    let singles: String = (1..=6).map(single).collect();
+    let text = UR10E.replace("[[validation]]", &format!("{singles}[[validation]]"));
+    check(
+        "ur10e-innopolis with single joints",
+        &text,
+        58,
+        8.0,
+        &[2.74, 4.22, 1.87, 0.376, 0.471, 0.407],
+        0.75,
+    );
+}
+
 #[test]
 fn staubli_tx40_with_its_coupled_wrist() {
     check("staubli-tx40", TX40, 61, 40.0, &[4.15, 5.69, 3.69, 1.40, 2.15, 1.29], 0.65);

@@ -121,8 +121,8 @@ fn recorded_logs_give_bodies_that_can_exist_at_a_stated_price() {
     }
 }
 
-/// Wrist currents of TIAGo are a few milliamperes, coarsely quantised: its README finds R² of 0.06 to 0.43 on joints 5 to 7.
-/// Joint 6 reaches 0.50 on the test part here, where the rule draws its line, and is left to it.
+/// Wrist currents of TIAGo are a few milliamperes, coarsely quantised: its README finds R² of 0.06 to 0.43 on joints 5 to 7. The torso,
+/// of which it finds 0.38 over all samples, is explained where it moves (0.66, on the test part 0.93): what is left over is friction at rest.
 #[test]
 fn poor_wrist_currents_are_named_and_nothing_rests_on_them() {
     let locked = [
@@ -163,12 +163,12 @@ part = [0.7, 1.0]
 "#;
     let Some((_, id)) = run(&text.replace("{locked}", &locked)) else { return };
     let names: Vec<&str> = id.model.outputs().iter().map(|o| o.name.as_str()).collect();
-    for joint in ["torso_lift_joint", "arm_5_joint", "arm_7_joint"] {
+    for joint in ["arm_5_joint", "arm_6_joint", "arm_7_joint"] {
         assert!(!id.explained[names.iter().position(|n| *n == joint).unwrap()], "{joint}");
     }
     let table = id.model.parameters();
     for (p, trust) in table.linear.iter().zip(&id.trust.parameters) {
-        let own = ["torso_lift_joint.", "arm_5_joint.", "arm_7_joint."].iter().any(|j| p.name.starts_with(j));
+        let own = ["arm_5_joint.", "arm_6_joint.", "arm_7_joint."].iter().any(|j| p.name.starts_with(j));
         assert!(!own || trust.assessment.verdict != Verdict::Seen, "{}", p.name);
     }
     let seen = id.trust.base.iter().filter(|a| a.verdict == Verdict::Seen).count();
