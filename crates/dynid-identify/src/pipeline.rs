@@ -360,6 +360,9 @@ impl Identification {
     pub(crate) fn validate(&mut self, mut log: Log) -> Result<(), Error> {
         log.log = self.plan.log_terms.of_validation(log.log, &log.settings);
         let mut prepared = log.prepare(&self.model, &self.conditioning_settings)?;
+        if let Some(choices) = self.conditioning.as_ref().filter(|choices| !choices.rms_speed.is_empty()) {
+            prepared.tell_speeds(&choices.rms_speed);
+        }
         if let Some(own) = self.own_delays.iter().find(|d| Some(&d.log) == log.settings.like.as_ref()) {
             own.take_off(&mut prepared)?;
         }
@@ -680,15 +683,29 @@ pub(crate) fn log_cautions(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caut
                 );
             }
         }
-        for (output, _) in log.moves.iter().enumerate().filter(|(_, moves)| !**moves) {
-            let joint = &model.outputs()[output].name;
+        for (output, _) in log.held.iter().enumerate().filter(|(_, held)| **held) {
+            let (joint, effort) = (&model.outputs()[output].name, log.effort[output][0]);
             add(
-                format!("{name}: joint `{joint}` does not move"),
                 format!(
-                    "record a motion of it (`dynid design` gives one), or hold it: `{joint} = 0.0` under `[locked]`, at the position that \
-                     it has"
+                    "{name}: joint `{joint}` does not move, and its effort is {effort} in every row: something else than its drive holds it, such as a \
+                     brake, and its rows do not count"
                 ),
+                "nothing, if that is so; else log the effort of the joint".to_owned(),
             );
+        }
+    }
+    // What some logs do not move others may.
+    for (output, of_joint) in model.outputs().iter().enumerate() {
+        let joint = &of_joint.name;
+        if !logs.is_empty() && logs.iter().all(|log| !log.moves[output]) {
+            let message = match logs {
+                [log] => format!("{}: joint `{joint}` does not move", short_name(&log.name)),
+                _ => format!("joint `{joint}` does not move in any of the logs"),
+            };
+            let remedy = format!(
+                "record a motion of it (`dynid design` gives one), or hold it: `{joint} = 0.0` under `[locked]`, at the position that it has"
+            );
+            out.push(Caution::warn(caution::LOG, message, remedy));
         }
     }
     out

@@ -162,6 +162,7 @@ fn logs_of_single_joints_add_to_a_log_of_all() {
     assert!(covered >= 0.85, "{covered}");
     assert!(id.explained.iter().all(|explained| *explained));
     assert_ne!(id.estimate().verdict.status.word(), "fail");
+    assert!(id.warnings.iter().all(|w| !w.message.contains("does not move")), "{:?}", id.warnings);
     // Nothing is said of columns by joints that hold still.
     assert!(id.findings.iter().all(|f| f.severity.word() != "error"), "{:?}", id.findings);
 }
@@ -199,6 +200,7 @@ fn a_joint_that_its_brake_holds_does_not_count() {
         assert!((found - without).abs() < 0.3, "{name}: {found} and {without} without that log");
     }
     assert_eq!(both.findings.iter().filter(|f| f.evidence.contains("brake")).count(), 3);
+    assert_eq!(both.warnings.iter().filter(|w| w.message.contains("do not count")).count(), 3);
 
     // A joint that no log moves is not known by its brake.
     let path = folder.path().join("only.csv");
