@@ -1,10 +1,6 @@
 //! Logs in which joints stand: tests of single joints, moves from pose to pose, brakes.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests outside of test functions; what was found is said"
-)]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
