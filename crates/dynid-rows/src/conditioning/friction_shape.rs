@@ -93,28 +93,31 @@ const EXPONENTS: [f64; 7] = [0.25, 0.35, 0.45, 0.55, 0.7, 1.4, 1.8];
 const LEAST: (f64, f64) = (0.03, 3.0);
 /// Largest `v_c` in parts of the rms speed.
 const WIDEST_TANH: f64 = 2.5;
-/// A joint moves in one direction if a smaller share of its samples moves in the other.
+/// A joint moves in one direction if a smaller share of the samples in which it moves goes in the other.
 const ONE_WAY: f64 = 0.01;
 
-/// Candidates of an output, kind after kind, speeds ascending; none where it moves in one direction only.
+/// Candidates of an output, kind after kind, speeds ascending; none where it moves in one direction only. Speeds are parts of the rms speed in
+/// the log in which it is greatest.
 pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -> Vec<FrictionShape> {
-    let (mut square, mut noise, mut samples) = (0.0, 0.0, 0.0);
+    let (mut rms, mut noise, mut samples) = (0.0_f64, 0.0, 0.0);
     let mut ways = [0usize; 2];
     for log in states {
         let sigma = log.velocity_sigma[output];
+        let mut square = 0.0;
         for v in &log.velocity(output) {
             square += v * v;
             ways[0] += usize::from(*v > LEAST.1 * sigma);
             ways[1] += usize::from(*v < -LEAST.1 * sigma);
         }
+        // Logs in which it stands say nothing of the speeds at which friction is in question.
+        rms = rms.max((square / log.samples as f64).sqrt());
         samples += log.samples as f64;
         noise += sigma * sigma * log.samples as f64;
     }
     let fewest = ways[0].min(ways[1]) as f64;
-    if fewest == 0.0 || fewest < ONE_WAY * samples {
+    if fewest == 0.0 || fewest < ONE_WAY * (ways[0] + ways[1]) as f64 {
         return Vec::new();
     }
-    let rms = (square / samples).sqrt();
     let least = (LEAST.0 * rms).max(LEAST.1 * (noise / samples).sqrt());
     let speeds = |kind: ShapeKind, most: f64, count: usize| -> Vec<FrictionShape> {
         if least >= most {

@@ -324,7 +324,10 @@ impl<'a> Search<'a> {
     /// Losses of an output: logarithm of the mean square residual in every time block, fitted without that block.
     fn losses(&self, fit: &Fit, output: usize, variances: &[f64]) -> Losses {
         let columns = self.columns(output, &fit.shapes[output]);
-        let rungs = [self.lowest[output], 0].map(|rung| &self.sums[&(output, rung)].scored);
+        // Rows without a mask hold reversals, and of a joint that rests for long above all rest, where more friction at low speed is more error.
+        let lowest = self.lowest[output];
+        let unmasked = if self.trial.rests(output) { lowest } else { 0 };
+        let rungs = [lowest, unmasked].map(|rung| &self.sums[&(output, rung)].scored);
         let per_block: Vec<[f64; 2]> = (0..rungs[0].len())
             .into_par_iter()
             .filter(|fold| rungs[0][*fold].rows > 0.0)
