@@ -14,6 +14,8 @@ use crate::prior::Prior;
 const WARN: f64 = 2.5;
 /// ... and from here on in another unit.
 const OTHER_UNIT: f64 = 8.0;
+/// Share of the samples in which a joint has to move for its gravity to be called too small.
+const MOVES: f64 = 0.5;
 /// Stated inertias that leave more of the efforts' variance unexplained say nothing where gravity does not act.
 const STATED: f64 = 0.3;
 /// Mass over the cube of the reach that gravity shows on arms, kg/m³, with room to either side: six arms of 0.9 to 1.4 m, from 18 to 34 kg,
@@ -97,12 +99,15 @@ pub(super) fn examine(
         false => None,
     };
     let limits = from_limits(bench, trial, wiring, applied);
-    // What stands still may stand where gravity does not act.
-    let least = if trial.moves.iter().all(|m| *m) { ARMS.0 } else { 0.0 };
+    // What stands still, or for most of the time, may stand where gravity does not act.
+    let all_move = trial.moves.iter().all(|m| *m);
+    let passes_gravity =
+        |joint: usize| all_move && trial.samples.sliding_share(wiring.position[joint].joint) >= MOVES;
     let efforts = trial.samples.efforts(wiring);
     let arm = density(bench, &identified).and_then(|(found, joint)| {
         // Springs, offsets, or an axis that stands upright may leave gravity nothing to do.
         let of_gravity = peak(&identified[joint]) * applied.abs() > GRAVITY_OF_EFFORT * peak(&efforts[joint]);
+        let least = if passes_gravity(joint) { ARMS.0 } else { 0.0 };
         of_gravity.then(|| Evidence {
             ratio: if found < least { found / least } else { (found / ARMS.1).max(1.0) },
             words: format!(

@@ -147,6 +147,12 @@ impl Samples {
         wiring.effort.iter().map(of).collect()
     }
 
+    /// Share of the samples in which a joint moves, away from reversal and rest.
+    pub fn sliding_share(&self, joint: usize) -> f64 {
+        let sliding = &self.joints[joint].sliding;
+        sliding.iter().filter(|sliding| **sliding).count() as f64 / sliding.len().max(1) as f64
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.block.len()
     }

@@ -58,6 +58,10 @@ fn ur10e_with_logs_of_single_joints() {
         |joint| format!("[[log]]\npath = \"{{data}}/ur10e-innopolis/20_01_22-joint_{joint}.csv.gz\"\n");
     let singles: String = (1..=6).map(single).collect();
     let text = UR10E.replace("[[validation]]", &format!("{singles}[[validation]]"));
+    let Some((_, id)) = run(&text) else { return };
+    assert_ne!(id.estimate().verdict.status.word(), "fail");
+    let doubts: Vec<_> = id.findings.iter().filter(|f| f.id.word() == "drive_gain").collect();
+    assert!(doubts.is_empty(), "arms at rest show no gravity: {doubts:?}");
     check(
         "ur10e-innopolis with single joints",
         &text,
