@@ -51,7 +51,7 @@ pub struct ConditioningSettings {
     pub folds: usize,
     /// A kernel whose held-out loss exceeds the best by this factor is rejected. Default 2.5.
     pub kernel_veto: f64,
-    /// A joint keeps a mask only if this share of its samples stays usable. Default 0.25.
+    /// A joint keeps a mask only if this share of the samples in which it moves stays usable. Default 0.25.
     pub least_usable: f64,
     /// A stricter mask must gain this share of the loss. Default 0.002.
     pub mask_gain: f64,
