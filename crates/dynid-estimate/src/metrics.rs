@@ -106,13 +106,18 @@ impl FitSums {
     }
 
     /// Sums of several records of the same channels. Variations are those about the mean of each record, so that figures formed of them say
-    /// what is explained within the records and nothing of the differences between them.
+    /// what is explained within the records and nothing of the differences between them. Of a channel that counts in some records the others
+    /// are left out.
     pub fn pooled<'a>(records: impl IntoIterator<Item = &'a FitSums>) -> FitSums {
         let mut records = records.into_iter();
         let mut out = records.next().cloned().unwrap_or_default();
         for record in records {
-            for ((sums, _), (more, _)) in out.channels.iter_mut().zip(&record.channels) {
-                sums.add(more);
+            for (all, more) in out.channels.iter_mut().zip(&record.channels) {
+                match (all.1, more.1) {
+                    (true, false) => {}
+                    (false, true) => *all = *more,
+                    _ => all.0.add(&more.0),
+                }
             }
         }
         out
@@ -270,6 +275,10 @@ mod tests {
         let r2 = [&first, &second].map(|f| f.channels[0].r2.unwrap());
         assert!((pooled.channels[0].r2.unwrap() - 0.5 * (r2[0] + r2[1])).abs() < 1e-12);
         assert_eq!(FitSums::pooled([&first.sums]).fit(), first);
+        // What does not count in a record says nothing beside one in which it does, whatever their order.
+        let mut held = FitSums::default();
+        held.push(&[0.0; 4], &[90.0; 4], false).unwrap();
+        assert_eq!(FitSums::pooled([&held, &first.sums, &held]).fit(), first);
         assert_eq!(FitSums::pooled([]).fit().channels, []);
     }
 

@@ -42,7 +42,7 @@ pub struct Agreement {
     pub predicted: Vec<Arc<Vec<f64>>>,
     /// Per output: where the prediction that pictures show differs; empty before [`Agreement::draw`].
     drawn: Vec<Patches>,
-    /// Per output: a drive acts there and moves the joint or holds it, so that its effort counts in figures over all joints.
+    /// Per output: a drive acts there, and nothing else holds the joint in this log, so that its effort counts in figures over all joints.
     pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
     pub moves: Vec<bool>,

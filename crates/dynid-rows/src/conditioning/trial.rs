@@ -40,6 +40,8 @@ pub(crate) struct Choice {
     pub(crate) free_delay: bool,
 }
 
+/// Share of the time from which on a joint rests for long.
+const RESTS: f64 = 0.25;
 /// Number of probe shapes.
 pub(crate) const PROBES: usize = 3;
 
@@ -180,7 +182,7 @@ impl Trial {
 
     /// Whether a joint rests for a quarter of the time or longer.
     pub(crate) fn rests(&self, output: usize) -> bool {
-        self.moving[output] <= 0.75
+        self.moving[output] <= 1.0 - RESTS
     }
 
     /// The strictest rung of an output, not stricter than asked for, that keeps the wanted share of the samples in which it moves: those in

@@ -9,8 +9,15 @@ use dynid::model::EffortModel;
 
 /// Runs a set and requires the geometric mean over joints of the RMS ratio to the baseline to stay below `limit`.
 /// Prediction and effort are not aligned by the delay here, as in the baseline.
-fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[f64], limit: f64) {
-    let Some((config, id)) = run(text) else { return };
+fn check(
+    name: &str,
+    text: &str,
+    parameters: usize,
+    filter_hz: f64,
+    baseline: &[f64],
+    limit: f64,
+) -> Option<dynid::Run> {
+    let (config, id) = run(text)?;
     // A power stands in place of viscous friction, the other shapes beside what is there.
     let adds =
         |joint: &JointFriction| joint.accepted.iter().filter(|t| t.shape.kind != ShapeKind::Power).count();
@@ -39,6 +46,7 @@ fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[
         }
     }
     assert!(plain <= limit, "{name}: {plain} above {limit}");
+    Some(id)
 }
 
 #[test]
@@ -58,18 +66,13 @@ fn ur10e_with_logs_of_single_joints() {
         |joint| format!("[[log]]\npath = \"{{data}}/ur10e-innopolis/20_01_22-joint_{joint}.csv.gz\"\n");
     let singles: String = (1..=6).map(single).collect();
     let text = UR10E.replace("[[validation]]", &format!("{singles}[[validation]]"));
-    let Some((_, id)) = run(&text) else { return };
+    let baseline = [2.74, 4.22, 1.87, 0.376, 0.471, 0.407];
+    let Some(id) = check("ur10e-innopolis with single joints", &text, 58, 8.0, &baseline, 0.75) else {
+        return;
+    };
     assert_ne!(id.estimate().verdict.status.word(), "fail");
     let doubts: Vec<_> = id.findings.iter().filter(|f| f.id.word() == "drive_gain").collect();
     assert!(doubts.is_empty(), "arms at rest show no gravity: {doubts:?}");
-    check(
-        "ur10e-innopolis with single joints",
-        &text,
-        58,
-        8.0,
-        &[2.74, 4.22, 1.87, 0.376, 0.471, 0.407],
-        0.75,
-    );
 }
 
 #[test]

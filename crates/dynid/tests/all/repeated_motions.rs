@@ -9,12 +9,11 @@
 use std::path::Path;
 
 use dynid::config::{Config, LogConfig};
-use dynid::model::EffortModel;
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Identification, identify};
 
-use crate::support::write_log;
+use crate::support::{inside, write_log};
 
 /// A controlled robot with all imperfections on a random motion of some period for 60 s.
 fn recorded(seed: u64, period_s: f64) -> SimulatedLog {
@@ -46,18 +45,6 @@ fn identified(log: &SimulatedLog, parts: &[(f64, f64)]) -> Identification {
         ..Config::default()
     };
     identify(&config, &mut |_| {}).unwrap().identification
-}
-
-/// How many intervals hold the truth, of how many.
-fn inside(id: &Identification, log: &SimulatedLog) -> (usize, usize) {
-    let table = &id.model.parameters().linear;
-    let of = |(p, trust): (&dynid::model::Parameter, &dynid::trust::ParameterTrust)| {
-        let truth = log.truth.iter().find(|(name, _)| *name == p.name)?.1;
-        let (low, high) = trust.interval?;
-        Some(usize::from(low <= truth && truth <= high))
-    };
-    let held: Vec<usize> = table.iter().zip(&id.trust.parameters).filter_map(of).collect();
-    (held.iter().sum(), held.len())
 }
 
 /// Shares of intervals that hold over some seeds, with twelve periods and with one.

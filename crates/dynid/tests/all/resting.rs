@@ -11,7 +11,7 @@ use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Identification, identify};
 
-use crate::support::write_log;
+use crate::support::{inside, write_log};
 
 const RATE_HZ: f64 = 250.0;
 const JOINTS: usize = 6;
@@ -127,16 +127,10 @@ fn error(id: &Identification, unseen: &SimulatedLog) -> f64 {
     ((0..JOINTS).map(of_joint).sum::<f64>() / JOINTS as f64).sqrt()
 }
 
-/// Shares of 95 % intervals that hold.
+/// Share of 95 % intervals that hold.
 fn coverage(id: &Identification, log: &SimulatedLog) -> f64 {
-    let table = &id.model.parameters().linear;
-    let of = |(p, trust): (&dynid::model::Parameter, &dynid::trust::ParameterTrust)| {
-        let truth = log.truth.iter().find(|(name, _)| *name == p.name)?.1;
-        let (low, high) = trust.interval?;
-        Some(usize::from(low <= truth && truth <= high))
-    };
-    let held: Vec<usize> = table.iter().zip(&id.trust.parameters).filter_map(of).collect();
-    held.iter().sum::<usize>() as f64 / held.len() as f64
+    let (held, all) = inside(id, log);
+    held as f64 / all as f64
 }
 
 #[test]

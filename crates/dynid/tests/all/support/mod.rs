@@ -8,8 +8,10 @@ use dynid::Config;
 use dynid::agreement::{Agreement, Alignment, compare};
 use dynid::estimators::conditioning::prepare;
 use dynid::io::csv;
+use dynid::model::{EffortModel, Parameter};
 use dynid::simulate::SimulatedLog;
-use dynid::{Run, identify};
+use dynid::trust::ParameterTrust;
+use dynid::{Identification, Run, identify};
 
 /// Panda with torque sensors, later 30 % kept back.
 pub(crate) const PANDA: &str = r#"
@@ -76,6 +78,18 @@ part = [0.0, 0.7]
 path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
 part = [0.7, 1.0]
 "#;
+
+/// How many 95 % intervals of standard parameters hold the truth of a virtual log, of how many.
+pub(crate) fn inside(id: &Identification, log: &SimulatedLog) -> (usize, usize) {
+    let table = &id.model.parameters().linear;
+    let of = |(p, trust): (&Parameter, &ParameterTrust)| {
+        let truth = log.truth.iter().find(|(name, _)| *name == p.name)?.1;
+        let (low, high) = trust.interval?;
+        Some(usize::from(low <= truth && truth <= high))
+    };
+    let held: Vec<usize> = table.iter().zip(&id.trust.parameters).filter_map(of).collect();
+    (held.iter().sum(), held.len())
+}
 
 /// Folder of shared data; without it the test is skipped.
 pub(crate) fn data() -> Option<PathBuf> {
