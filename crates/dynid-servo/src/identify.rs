@@ -21,14 +21,15 @@ use crate::free::{Free, ServoValues};
 use crate::joint::Scheme;
 use crate::log::ServoLog;
 use crate::rollout::Lost;
-use crate::settings::{Addition, Choice, ServoSettings, Shared};
+use crate::settings::{Addition, Choice, ServoSettings};
 use crate::start::{StartSettings, linear_start};
 use crate::term::Term;
 pub use result::{
     AdditionTrial, DirectionTrial, GroupKind, HorizonError, ServoError, ServoGroup, ServoIdentification,
     ServoParameter, ServoVerdict, Spread, TOLD_DIRECTION,
 };
-use verdict::{groups, parameters};
+pub(crate) use verdict::groups;
+use verdict::parameters;
 
 /// Folds of the logs that additions are judged on.
 const FOLDS: usize = 3;
@@ -40,10 +41,7 @@ const LEAST_GAIN: f64 = 0.02;
 const LEAST_SURE_GAIN: f64 = 0.005;
 
 /// Share of the residual that half the step may move the simulation by.
-const STEP_SHARE: f64 = 0.2;
-
-/// Standard deviations from what is known of it within which a zero must lie.
-const ZERO_STDS: f64 = 3.0;
+const STEP_SHARE: f64 = 0.1;
 
 /// Halvings of the step at most.
 const HALVINGS: usize = 4;
@@ -93,13 +91,14 @@ pub fn identify(
         scheme: Scheme {
             step_s: settings.step_s.unwrap_or(1.1 * period),
             sign_width: 0.0,
+            middle: true,
             load: settings.load,
             hold: settings.hold,
         },
         evaluations: 0,
     };
     let own_gains = settings.own_gains.then_some(Addition::OwnGains);
-    let plain = work.free(&own_gains.into_iter().collect());
+    let plain = settings.free(&chains, &own_gains.into_iter().collect());
     let mut laws: BTreeSet<Addition> = match &settings.choice {
         Choice::HeldOut => BTreeSet::new(),
         Choice::Given(given) => given.iter().copied().collect(),
@@ -110,7 +109,7 @@ pub fn identify(
     let directions = work.directions(&mut known, &plain, &laws)?;
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
-    let free = work.free(&laws);
+    let free = settings.free(&chains, &laws);
     let mut fitted = work.first_fit(&free, begin, &GaussNewton::default())?;
     let mut trials = Vec::new();
     let mut richer = Vec::new();
@@ -190,56 +189,6 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// What a law leaves free.
-    fn free(&self, laws: &BTreeSet<Addition>) -> Vec<Free> {
-        let s = self.settings;
-        let n = s.joints.len();
-        let own = |term: Term| (0..n).map(move |j| Free::term(term, [j]));
-        let mut out: Vec<Free> = Vec::new();
-        let unknown: Vec<usize> = (0..n).filter(|j| !s.known_gain[*j]).collect();
-        if laws.contains(&Addition::OwnGains) {
-            out.extend(unknown.iter().map(|j| Free::term(Term::PositionGain, [*j])));
-        } else if !unknown.is_empty() {
-            out.push(Free::term(Term::PositionGain, unknown));
-        }
-        for term in [Term::RotorInertia, Term::Viscous, Term::Coulomb] {
-            out.extend(own(term));
-        }
-        if !s.known_delay {
-            match s.delay {
-                Shared::All => out.push(Free::term(Term::Delay, 0..n)),
-                Shared::Chain => {
-                    out.extend(self.chains.iter().map(|c| Free::term(Term::Delay, c.joints.iter().copied())));
-                }
-                Shared::Own => out.extend(own(Term::Delay)),
-            }
-        }
-        for term in &s.find {
-            out.extend(own(*term));
-        }
-        for addition in laws {
-            match addition {
-                Addition::Offset => out.extend(own(Term::Offset)),
-                Addition::Zero => {
-                    // Thousands of rows with the same error outweigh any knowledge: what is known bounds the zero too.
-                    let zero = |j: usize| {
-                        let (known, most) = (s.joints[j].get(Term::Zero), ZERO_STDS * s.zero_std);
-                        let free = Free::term(Term::Zero, [j]).known(known, s.zero_std);
-                        Free { lower: known - most, upper: known + most, ..free }
-                    };
-                    out.extend((0..n).filter(|j| !s.known_zero[*j]).map(zero));
-                }
-                Addition::Stiction => {
-                    out.extend(own(Term::Stiction));
-                    out.extend(own(Term::StribeckVelocity).map(|f| Free { upper: 1.0, ..f }));
-                }
-                Addition::Load => out.extend(own(Term::LoadFriction)),
-                Addition::OwnGains => {}
-            }
-        }
-        out
-    }
-
     /// Start of a law from an estimate of the law that it is added to.
     fn begin(&self, from: &ServoValues, laws: &BTreeSet<Addition>, new: Option<Addition>) -> ServoValues {
         let mut out = from.clone();
@@ -278,7 +227,7 @@ impl Work<'_> {
         }
         let mut with = laws.clone();
         with.insert(Addition::Zero);
-        let free = self.free(&with);
+        let free = self.settings.free(self.chains, &with);
         let short = GaussNewton { evaluations: 14, tolerance: 1e-3, ..GaussNewton::default() };
         let fit_of = |work: &mut Self, known: &ServoValues| -> Result<Fitted, ServoError> {
             let start = work.start(known, plain)?;
@@ -322,7 +271,7 @@ impl Work<'_> {
     }
 
     fn fit(&mut self, laws: &BTreeSet<Addition>, start: &ServoValues) -> Result<Fitted, Lost> {
-        let free = self.free(laws);
+        let free = self.settings.free(self.chains, laws);
         self.refit(&free, start, self.scheme, &GaussNewton::default())
     }
 
@@ -420,7 +369,7 @@ impl Work<'_> {
             let mut with = laws.clone();
             with.insert(addition);
             let begin = self.begin(&fitted.values, &with, Some(addition));
-            let free = self.free(&with);
+            let free = self.settings.free(self.chains, &with);
             let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
             let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
             let beside = laws.iter().copied().collect();
@@ -455,7 +404,7 @@ impl Work<'_> {
 
     /// Halves the step until the simulation hardly moves; returns the share by which it still does.
     fn settle_step(&mut self, laws: &BTreeSet<Addition>, fitted: &mut Fitted) -> Result<f64, ServoError> {
-        let free = self.free(laws);
+        let free = self.settings.free(self.chains, laws);
         let mut share = 0.0;
         for round in 0..=HALVINGS {
             share = self.step_share(fitted)?;
@@ -493,7 +442,7 @@ impl Work<'_> {
         step_share: f64,
         start: crate::start::LinearStart,
     ) -> Result<ServoIdentification, ServoError> {
-        let free = self.free(&laws);
+        let free = self.settings.free(self.chains, &laws);
         let n = mechanism.rates();
         let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
         let floor: Vec<f64> =
@@ -502,7 +451,7 @@ impl Work<'_> {
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
         let spreads = self.spreads(&free, &fitted, richer, is_wrong(misfit))?;
         let parameters = parameters(&free, &fitted, &found, &spreads, self.settings, self.logs);
-        let groups = groups(&free, &found);
+        let groups = groups(&free, &found.inside, &found.correlation);
         let mut horizons = Vec::new();
         for horizon_s in [0.1, 0.5, 2.0, f64::INFINITY] {
             horizons.push(HorizonError { horizon_s, rms: self.horizon(&fitted, horizon_s)? });

@@ -93,6 +93,10 @@ pub struct Scheme {
     pub step_s: f64,
     /// Width `w` of the sign of velocities `tanh(v/w)`, rad/s; 0: joints stick. Default 0.
     pub sign_width: f64,
+    /// Whether efforts that go with velocities are taken in the middle of a step, velocities extrapolated from the step before, and a joint that
+    /// turns round within a step has friction of both signs in it: the error is then of second order. Else they are taken where the step begins or
+    /// ends, and the error is of first order. Default true.
+    pub middle: bool,
     /// What load friction grows with.
     pub load: LoadOf,
     /// What commands do between samples.
@@ -101,6 +105,6 @@ pub struct Scheme {
 
 impl Default for Scheme {
     fn default() -> Self {
-        Scheme { step_s: 5e-3, sign_width: 0.0, load: LoadOf::default(), hold: Hold::default() }
+        Scheme { step_s: 5e-3, sign_width: 0.0, middle: true, load: LoadOf::default(), hold: Hold::default() }
     }
 }

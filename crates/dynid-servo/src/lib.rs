@@ -9,6 +9,7 @@
 //! | where does the robot go, and how does that change with every number | [`Rollout`] |
 //! | a first guess from filtered motion | [`start`] |
 //! | numbers whose simulation gives the measured positions | [`fit`] |
+//! | what will a log of these commands tell | [`forecast`] |
 //! | numbers with intervals, verdicts and what cannot be told | [`identify`] |
 //!
 //! Input is a [`Mechanism`](dynid_model::Mechanism) and arrays; no file is opened. Units are SI, angles rad. Whatever number of threads
@@ -16,6 +17,7 @@
 
 pub mod chain;
 pub mod fit;
+pub mod forecast;
 mod free;
 pub mod identify;
 mod joint;

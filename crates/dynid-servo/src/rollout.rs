@@ -152,6 +152,10 @@ struct Run<'a> {
     q: Vec<f64>,
     v: Vec<f64>,
     middle: Vec<f64>,
+    /// Velocities in the middle of a step as they are foreseen.
+    ahead: Vec<f64>,
+    /// Accelerations of the step before.
+    before: Vec<f64>,
     acceleration: Vec<f64>,
     reading: Vec<f64>,
     effort: Vec<f64>,
@@ -171,6 +175,9 @@ struct Slopes {
     reading: Vec<f64>,
     effort: Vec<f64>,
     half: Vec<f64>,
+    /// Of the velocities in the middle as they are foreseen, and of the accelerations of the step before.
+    ahead: Vec<f64>,
+    accelerated: Vec<f64>,
     /// Of one drive at the beginning of a step.
     before: Vec<f64>,
 }
@@ -202,6 +209,8 @@ impl<'a> Run<'a> {
             q: vec![0.0; n],
             v: vec![0.0; n],
             middle: vec![0.0; n],
+            ahead: vec![0.0; n],
+            before: vec![0.0; n],
             acceleration: vec![0.0; n],
             reading: vec![0.0; n],
             effort: vec![0.0; n],
@@ -216,6 +225,8 @@ impl<'a> Run<'a> {
                 reading: zeros(),
                 effort: zeros(),
                 half: zeros(),
+                ahead: zeros(),
+                accelerated: zeros(),
                 before: vec![0.0; p],
             },
             steps: 0,
@@ -261,9 +272,8 @@ impl<'a> Run<'a> {
             (shaped.limited, shaped.smoothed) = (first, first);
         }
         let slopes = &mut self.slopes;
-        for all in
-            [&mut slopes.q, &mut slopes.v, &mut slopes.limited, &mut slopes.smoothed, &mut slopes.effort]
-        {
+        let Slopes { q, v, limited, smoothed, effort, accelerated, .. } = slopes;
+        for all in [q, v, limited, smoothed, effort, accelerated] {
             all.fill(0.0);
         }
         for (c, column) in rollout.columns.iter().enumerate() {
@@ -272,6 +282,7 @@ impl<'a> Run<'a> {
             }
         }
         self.effort = vec![0.0; *n];
+        self.before = vec![0.0; *n];
     }
 
     fn show(&mut self, row: usize, see: &mut impl FnMut(SimulatedRow<'_>)) {
@@ -361,10 +372,13 @@ impl<'a> Run<'a> {
         self.command(t, h);
         for j in 0..self.n {
             self.middle[j] = self.q[j] + 0.5 * h * self.v[j];
+            let gained = if self.rollout.scheme.middle { 0.5 * h * self.before[j] } else { 0.0 };
+            self.ahead[j] = self.v[j] + gained;
         }
-        self.equation.values(&self.middle, &self.v);
+        self.equation.values(&self.middle, &self.ahead);
         let begin = Begin {
             joints: &self.joints,
+            ahead: (&self.middle, &self.ahead),
             wanted: &self.wanted,
             mass: &self.equation.mass,
             bias: &self.equation.bias,
@@ -381,6 +395,7 @@ impl<'a> Run<'a> {
         }
         for j in 0..self.n {
             let next = self.solver.next[j];
+            self.before[j] = (next - self.v[j]) / h;
             self.q[j] += 0.5 * h * (self.v[j] + next);
             self.v[j] = next;
         }
@@ -394,21 +409,27 @@ impl<'a> Run<'a> {
         }
         let loaded = self.joints.iter().any(|j| j.load > 0.0) || self.has(Term::LoadFriction);
         let by_bodies = loaded && self.rollout.scheme.load == LoadOf::Bodies;
-        self.equation.slopes(&self.middle, &self.v, &self.acceleration, by_bodies);
+        self.equation.slopes(&self.middle, &self.ahead, &self.acceleration, by_bodies);
         if self.rollout.of_inertias {
-            self.equation.regressors(&self.middle, &self.v, &self.acceleration);
+            self.equation.regressors(&self.middle, &self.ahead, &self.acceleration);
         }
         let (equation, solver) = (&self.equation, &self.solver);
-        let Slopes { q, v, wanted, drive, rhs, half, effort, before: row_before, .. } = &mut self.slopes;
+        let in_middle = self.rollout.scheme.middle;
+        let Slopes { q, v, wanted, drive, rhs, half, ahead, accelerated, effort, before: row_before, .. } =
+            &mut self.slopes;
         for (half, (q, v)) in half.iter_mut().zip(q.iter().zip(v.iter())) {
             *half = q + 0.5 * h * v;
+        }
+        for (ahead, (v, a)) in ahead.iter_mut().zip(v.iter().zip(accelerated.iter())) {
+            *ahead = if in_middle { v + 0.5 * h * a } else { *v };
         }
         for j in 0..n {
             let joint = &self.joints[j];
             let own = j * p..(j + 1) * p;
             let at = solver.drive[j];
             let mean = 0.5 * (self.v[j] + solver.next[j]);
-            let sign = solver.sign(j);
+            let begin = self.v[j];
+            let sign = solver.by_level(joint, j, begin);
             let row = &mut drive[own.clone()];
             let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * joint.kd;
             for (to, i) in row.iter_mut().zip(own.clone()) {
@@ -416,16 +437,17 @@ impl<'a> Run<'a> {
             }
             self.rollout.by_drive(j, &at, self.wanted[j].velocity - mean, row);
             let to = &mut rhs[own.clone()];
+            let by_begin = 0.5 * joint.viscous + solver.kink(joint, j, begin).2;
             for c in 0..p {
-                to[c] = 0.5 * joint.viscous * v[own.start + c] - row[c];
+                to[c] = by_begin * v[own.start + c] - row[c];
             }
             for k in 0..n {
                 let inertia = equation.mass[j * n + k] + if j == k { joint.rotor } else { 0.0 };
                 let by_position = equation.by_position[j * n + k];
-                let by_rate = equation.by_rate[j * n + k] - inertia / h;
-                let (half, v) = (&half[k * p..][..p], &v[k * p..][..p]);
+                let (by_rate, over) = (equation.by_rate[j * n + k], inertia / h);
+                let (half, ahead, v) = (&half[k * p..][..p], &ahead[k * p..][..p], &v[k * p..][..p]);
                 for c in 0..p {
-                    to[c] += by_position * half[c] + by_rate * v[c];
+                    to[c] += by_position * half[c] + by_rate * ahead[c] - over * v[c];
                 }
             }
             let carried = solver.carried[j];
@@ -436,26 +458,28 @@ impl<'a> Run<'a> {
                         for k in 0..n {
                             let by_position = level * equation.bias_by_position[j * n + k];
                             let by_rate = level * equation.by_rate[j * n + k];
-                            let (half, v) = (&half[k * p..][..p], &v[k * p..][..p]);
+                            let (half, ahead) = (&half[k * p..][..p], &ahead[k * p..][..p]);
                             for c in 0..p {
-                                to[c] += by_position * half[c] + by_rate * v[c];
+                                to[c] += by_position * half[c] + by_rate * ahead[c];
                             }
                         }
                     }
                     LoadOf::Drive => {
                         let before = solver.before[j];
                         let row = &mut *row_before;
+                        let (at, rate) = if in_middle { (&*half, &*ahead) } else { (&*q, &*v) };
                         for (to, i) in row.iter_mut().zip(own.clone()) {
-                            *to = before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
+                            *to = before.by_error * (wanted[i] - at[i])
+                                - before.by_damping * joint.kd * rate[i];
                         }
-                        self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.v[j], row);
+                        self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.ahead[j], row);
                         for c in 0..p {
                             to[c] += level * row[c];
                         }
                     }
                 }
             }
-            let speed = solver.next[j].abs();
+            let speed = solver.speed(j, begin);
             let x = speed / joint.stribeck;
             let decay = (-x * x).exp();
             for (c, column) in self.rollout.columns.iter().enumerate() {
@@ -495,6 +519,7 @@ impl<'a> Run<'a> {
             for i in j * p..(j + 1) * p {
                 let next = -rhs[i];
                 effort[i] = drive[i] - quarter * next;
+                accelerated[i] = (next - v[i]) / h;
                 q[i] += 0.5 * h * (v[i] + next);
                 v[i] = next;
             }

@@ -1,5 +1,9 @@
 //! What is known of a robot's drives, and what an identification is to find.
 
+use std::collections::BTreeSet;
+
+use crate::chain::Chain;
+use crate::free::Free;
 use crate::joint::{Hold, Limited, LoadOf, ServoJoint};
 use crate::term::Term;
 
@@ -57,6 +61,9 @@ pub enum Choice {
     /// These.
     Given(Vec<Addition>),
 }
+
+/// Standard deviations from what is known of it within which a zero must lie.
+const ZERO_STDS: f64 = 3.0;
 
 /// What is known and what is asked.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,5 +129,56 @@ impl ServoSettings {
     pub fn limited(mut self, limited: Limited) -> Self {
         self.joints.iter_mut().for_each(|j| j.limited = limited);
         self
+    }
+
+    /// What a law leaves free: position gains that are not known, rotor inertia, viscous and Coulomb friction, delay, the terms that are found
+    /// besides, and those of the additions.
+    pub fn free(&self, chains: &[Chain], laws: &BTreeSet<Addition>) -> Vec<Free> {
+        let s = self;
+        let n = s.joints.len();
+        let own = |term: Term| (0..n).map(move |j| Free::term(term, [j]));
+        let mut out: Vec<Free> = Vec::new();
+        let unknown: Vec<usize> = (0..n).filter(|j| !s.known_gain[*j]).collect();
+        if laws.contains(&Addition::OwnGains) {
+            out.extend(unknown.iter().map(|j| Free::term(Term::PositionGain, [*j])));
+        } else if !unknown.is_empty() {
+            out.push(Free::term(Term::PositionGain, unknown));
+        }
+        for term in [Term::RotorInertia, Term::Viscous, Term::Coulomb] {
+            out.extend(own(term));
+        }
+        if !s.known_delay {
+            match s.delay {
+                Shared::All => out.push(Free::term(Term::Delay, 0..n)),
+                Shared::Chain => {
+                    out.extend(chains.iter().map(|c| Free::term(Term::Delay, c.joints.iter().copied())));
+                }
+                Shared::Own => out.extend(own(Term::Delay)),
+            }
+        }
+        for term in &s.find {
+            out.extend(own(*term));
+        }
+        for addition in laws {
+            match addition {
+                Addition::Offset => out.extend(own(Term::Offset)),
+                Addition::Zero => {
+                    // Thousands of rows with the same error outweigh any knowledge: what is known bounds the zero too.
+                    let zero = |j: usize| {
+                        let (known, most) = (s.joints[j].get(Term::Zero), ZERO_STDS * s.zero_std);
+                        let free = Free::term(Term::Zero, [j]).known(known, s.zero_std);
+                        Free { lower: known - most, upper: known + most, ..free }
+                    };
+                    out.extend((0..n).filter(|j| !s.known_zero[*j]).map(zero));
+                }
+                Addition::Stiction => {
+                    out.extend(own(Term::Stiction));
+                    out.extend(own(Term::StribeckVelocity).map(|f| Free { upper: 1.0, ..f }));
+                }
+                Addition::Load => out.extend(own(Term::LoadFriction)),
+                Addition::OwnGains => {}
+            }
+        }
+        out
     }
 }

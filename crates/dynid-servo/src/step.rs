@@ -3,12 +3,23 @@
 //! Unknown is the velocity `v⁺` at the end of a step `h` from `(q, v)`:
 //!
 //! ```text
-//! (M(m) + I_a)(v⁺ - v)/h + b(m, v) - τ(u, q_a, v_a) + F_v v_a + o + L(v⁺) sign(v⁺) ∋ 0
+//! (M(m) + I_a)(v⁺ - v)/h + b(m, w) - τ(u, q_a, v_a) + F_v v_a + o + L s(v, v⁺) ∋ 0
 //! m = q + h v/2,   v_a = (v + v⁺)/2,   q_a = q + h v_a/2,   q⁺ = q + h v_a
+//! w = v + (v - v⁻) h/(2 h⁻),   L at (|v| + |v⁺|)/2
 //! ```
 //!
-//! Position and damping stand in the middle (second order), friction at the end, so that it can hold: with a sign width of 0
-//! the sign is the set `[-1, 1]` at rest and a joint that the rest cannot move stays where it is, exactly.
+//! `v⁻` is the velocity a step `h⁻` before. All is taken in the middle, so that the error is of second order. The sign `s` is that of both velocities.
+//! Where they differ, friction has the old sign for a share `α` of the step, in which the joint comes to rest, and the other one after that:
+//! `s = (2α - 1) sign(v)`, with accelerations that are `k/h = 2L/μ` apart, `μ` the inertia that the joint alone would move,
+//!
+//! ```text
+//! k α² - (|v| + k + |v⁺|) α + |v| = 0
+//! ```
+//!
+//! With a sign width of 0 a joint that comes to rest in a step stays there, exactly, if friction can hold what is left without its own inertia; a
+//! joint at rest has the set `[-1, 1]` for `s`.
+//!
+//! Without [`Scheme::middle`]: `w = v`, `L` and `s` at `v⁺`.
 
 use crate::joint::{Limited, LoadOf, Scheme, ServoJoint};
 use crate::term::Term;
@@ -147,19 +158,31 @@ pub(crate) struct Solver {
     pub(crate) drive: Vec<Drive>,
     /// What load friction grows with.
     pub(crate) carried: Vec<f64>,
-    /// Drives at the beginning of the step, for [`LoadOf::Drive`].
+    /// Drives as they are foreseen in the middle of the step, or at its beginning, for [`LoadOf::Drive`].
     pub(crate) before: Vec<Drive>,
     /// Steps that did not settle.
     pub(crate) unsettled: usize,
     residual: Vec<f64>,
     slope: Vec<f64>,
     change: Vec<f64>,
+    /// Velocities that friction of one sign and of the other are apart by at the end of a step, per friction: of joints that turn.
+    turning: Vec<f64>,
     pub(crate) tangent: Tangent,
+}
+
+/// Share of a step before a joint turns round, and its slopes.
+struct Turn {
+    share: f64,
+    by_begin: f64,
+    by_end: f64,
+    by_level: f64,
 }
 
 /// What a step begins from.
 pub(crate) struct Begin<'a> {
     pub(crate) joints: &'a [Numbers],
+    /// Positions and velocities in the middle of the step, as they are foreseen.
+    pub(crate) ahead: (&'a [f64], &'a [f64]),
     pub(crate) wanted: &'a [Wanted],
     pub(crate) mass: &'a [f64],
     pub(crate) bias: &'a [f64],
@@ -182,6 +205,7 @@ impl Solver {
             residual: vec![0.0; n],
             slope: vec![0.0; n],
             change: vec![0.0; n],
+            turning: vec![0.0; n],
             tangent: Tangent::new(n),
         }
     }
@@ -206,24 +230,83 @@ impl Solver {
         }
     }
 
-    /// Friction of the sign at a velocity and its slope.
-    fn kink(&self, joint: &Numbers, j: usize) -> (f64, f64) {
+    /// Friction of the sign between two velocities, and its slopes by that at the end and at the beginning.
+    pub(crate) fn kink(&self, joint: &Numbers, j: usize, begin: f64) -> (f64, f64, f64) {
         let v = self.next[j];
-        let (dry, dry_slope) = joint.dry(v.abs());
+        let (dry, dry_slope) = joint.dry(self.speed(j, begin));
         let level = dry + joint.load * self.carried[j].abs();
         let width = self.scheme.sign_width;
         if width > 0.0 {
             let sign = (v / width).tanh();
-            let signed_slope = dry_slope * v.signum();
-            return (level * sign, level * (1.0 - sign * sign) / width + signed_slope * sign);
+            let (ended, begun) = if self.scheme.middle { (0.5, 0.5 * begin.signum()) } else { (1.0, 0.0) };
+            let by_end = level * (1.0 - sign * sign) / width + ended * dry_slope * v.signum() * sign;
+            return (level * sign, by_end, begun * dry_slope * sign);
         }
-        (level * self.side[j], dry_slope * self.side[j] * self.side[j])
+        let side = self.side[j];
+        if !self.scheme.middle || side == 0.0 {
+            return (level * side, dry_slope * side * side, 0.0);
+        }
+        let was = if begin == 0.0 { 0.0 } else { begin.signum() };
+        if !self.turns(j, begin) {
+            return (level * side, 0.5 * dry_slope * side * side, 0.5 * dry_slope * was * side);
+        }
+        let Turn { share, by_begin, by_end, by_level } = self.turn(j, begin, level);
+        let sign = (2.0 * share - 1.0) * was;
+        // By the speeds |v| and |v⁺|, the level among them; the velocities have the signs `was` and `side`.
+        let by_level = sign + 2.0 * level * by_level * was;
+        let by = |share_by: f64| by_level * 0.5 * dry_slope + 2.0 * level * share_by * was;
+        (level * sign, by(by_end) * side, by(by_begin) * was)
     }
 
-    /// Sign of a joint's velocity at the end of the step as friction takes it.
-    pub(crate) fn sign(&self, j: usize) -> f64 {
-        let width = self.scheme.sign_width;
-        if width > 0.0 { (self.next[j] / width).tanh() } else { self.side[j] }
+    /// What friction of the sign gains per friction `L`.
+    pub(crate) fn by_level(&self, joint: &Numbers, j: usize, begin: f64) -> f64 {
+        if !self.turns(j, begin) {
+            let width = self.scheme.sign_width;
+            return if width > 0.0 { (self.next[j] / width).tanh() } else { self.side[j] };
+        }
+        let level = joint.dry(self.speed(j, begin)).0 + joint.load * self.carried[j].abs();
+        let turn = self.turn(j, begin, level);
+        (2.0 * turn.share - 1.0 + 2.0 * level * turn.by_level) * begin.signum()
+    }
+
+    /// Whether a joint slips the other way at the end of a step than at its beginning.
+    fn turns(&self, j: usize, begin: f64) -> bool {
+        self.scheme.middle && self.scheme.sign_width == 0.0 && self.side[j] * begin < 0.0
+    }
+
+    /// Speed at which friction is taken.
+    pub(crate) fn speed(&self, j: usize, begin: f64) -> f64 {
+        let end = self.next[j].abs();
+        if self.scheme.middle { 0.5 * (begin.abs() + end) } else { end }
+    }
+
+    /// Share of the step before a joint turns, with slopes by speeds at the beginning and the end and by the friction; from `k`, see above.
+    fn turn(&self, j: usize, begin: f64, level: f64) -> Turn {
+        let (v, u, k) = (begin.abs(), self.next[j].abs(), level * self.turning[j]);
+        let sum = v + k + u;
+        // The other root of the equation is above one.
+        let root = (sum * sum - 4.0 * k * v).max(1e-24 * sum * sum).sqrt();
+        // 2v/(sum + root) is (sum - root)/2k without its loss of digits where friction is little.
+        let share = 2.0 * v / (sum + root);
+        // Slopes of k α² - sum α + v = 0.
+        Turn {
+            share,
+            by_begin: (1.0 - share) / root,
+            by_end: -share / root,
+            by_level: self.turning[j] * share * (share - 1.0) / root,
+        }
+    }
+
+    /// Finds `2 h/μ` of a joint at rest, `μ` the inertia that it alone would move, the others that slip yielding.
+    fn find_turning(&mut self, b: &Begin<'_>, j: usize) {
+        self.slope.fill(0.0);
+        self.side[j] = 1.0;
+        self.tangent.fill(b, &self.slope, &self.side);
+        self.side[j] = 0.0;
+        self.change.fill(0.0);
+        self.change[j] = 1.0;
+        self.tangent.solve(&mut self.change, 1);
+        self.turning[j] = 2.0 * self.change[j];
     }
 
     /// Most that a resting joint can hold.
@@ -237,7 +320,9 @@ impl Solver {
             self.carried[j] = match self.scheme.load {
                 LoadOf::Bodies => b.bias[j],
                 LoadOf::Drive => {
-                    self.before[j] = b.joints[j].drive(b.wanted[j], b.q[j], b.v[j]);
+                    let (q, v) =
+                        if self.scheme.middle { (b.ahead.0[j], b.ahead.1[j]) } else { (b.q[j], b.v[j]) };
+                    self.before[j] = b.joints[j].drive(b.wanted[j], q, v);
                     self.before[j].effort
                 }
             };
@@ -253,7 +338,7 @@ impl Solver {
         for _ in 0..ROUNDS {
             self.smooth(b);
             for j in 0..self.n {
-                let (friction, slope) = self.kink(&b.joints[j], j);
+                let (friction, slope, _) = self.kink(&b.joints[j], j, b.v[j]);
                 self.residual[j] += friction;
                 self.slope[j] += slope.max(0.0);
             }
@@ -289,7 +374,7 @@ impl Solver {
         for round in 0..ROUNDS {
             self.smooth(b);
             for j in 0..self.n {
-                let (friction, slope) = self.kink(&b.joints[j], j);
+                let (friction, slope, _) = self.kink(&b.joints[j], j, b.v[j]);
                 self.residual[j] += friction;
                 // The falling part of Stribeck's curve, as far as the inertia outweighs it: cut off, the rounds would creep.
                 let least = -0.5 * (b.mass[j * self.n + j] + b.joints[j].rotor) / b.h;
@@ -305,8 +390,13 @@ impl Solver {
             let mut turned = false;
             for j in 0..self.n {
                 if self.side[j] != 0.0 && self.next[j] * self.side[j] < 0.0 && !(turned && one_by_one) {
-                    self.side[j] = 0.0;
-                    self.next[j] = 0.0;
+                    if self.turns(j, b.v[j]) {
+                        // It does not turn after all.
+                        self.side[j] = -self.side[j];
+                    } else {
+                        self.side[j] = 0.0;
+                        self.next[j] = 0.0;
+                    }
                     turned = true;
                 }
             }
@@ -315,11 +405,20 @@ impl Solver {
             }
             self.smooth(b);
             for j in 0..self.n {
-                if self.side[j] == 0.0
-                    && self.residual[j].abs() > self.hold(&b.joints[j], j) * (1.0 + 1e-12)
-                    && !(turned && one_by_one)
-                {
-                    self.side[j] = -self.residual[j].signum();
+                if self.side[j] != 0.0 || (turned && one_by_one) {
+                    continue;
+                }
+                let mut pushes = self.residual[j];
+                let stops = self.scheme.middle && b.v[j] != 0.0;
+                if stops {
+                    // What stops the joint within the step is not what it is held against from then on.
+                    self.find_turning(b, j);
+                    pushes += 2.0 * b.v[j] / self.turning[j];
+                }
+                // A joint that friction has just stopped goes on only the other way.
+                let goes_on = stops && -pushes * b.v[j] > 0.0;
+                if pushes.abs() > self.hold(&b.joints[j], j) * (1.0 + 1e-12) && !goes_on {
+                    self.side[j] = -pushes.signum();
                     turned = true;
                 }
             }
@@ -346,7 +445,7 @@ impl Solver {
     fn finish(&mut self, b: &Begin<'_>) {
         self.smooth(b);
         for j in 0..self.n {
-            self.slope[j] += self.kink(&b.joints[j], j).1;
+            self.slope[j] += self.kink(&b.joints[j], j, b.v[j]).1;
         }
         self.tangent.fill(b, &self.slope, &self.side);
     }

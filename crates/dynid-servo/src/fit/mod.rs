@@ -5,5 +5,6 @@ mod gauss_newton;
 mod spread;
 
 pub use evaluation::{Block, BlockSums, Evaluation, ServoProblem, blocks};
+pub(crate) use gauss_newton::with_priors;
 pub use gauss_newton::{Ending, Fitted, GaussNewton, Place, fit};
 pub use spread::{Deviations, deviations};

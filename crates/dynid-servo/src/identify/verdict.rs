@@ -1,5 +1,7 @@
 //! Intervals, verdicts, and what is known together only.
 
+use dynid_linalg::Mat;
+
 use super::result::{GroupKind, ServoGroup, ServoParameter, ServoVerdict, Spread};
 use crate::fit::{Deviations, Fitted, Place};
 use crate::free::Free;
@@ -22,8 +24,8 @@ pub(super) fn parameters(
         let t = found.quantile[k];
         let std = found.jackknife[k];
         let half_width = std.map(|sd| {
-            // The step's error is of first order: half of it is what half the step takes away.
-            let parts = [t * sd, spread.law, 2.0 * spread.step, t * spread.folds, spread.gain];
+            // The step's error is of second order: half the step takes three quarters of it away.
+            let parts = [t * sd, spread.law, 4.0 / 3.0 * spread.step, t * spread.folds, spread.gain];
             // Folds and jackknife measure the same thing: the larger counts.
             let own = parts[0].max(parts[3]);
             (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()
@@ -89,13 +91,13 @@ fn per_gain(free: &[Free], fitted: &Fitted, found: &Deviations, k: usize, t: f64
 /// Correlation from which parameters count as one.
 const TOGETHER: f64 = 0.9;
 
-/// Parameters whose estimates go together.
-pub(super) fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
-    let m = found.inside.len();
+/// Parameters whose estimates go together: `correlation` is that of the parameters `inside`.
+pub(crate) fn groups(free: &[Free], inside: &[usize], correlation: &Mat) -> Vec<ServoGroup> {
+    let m = inside.len();
     let mut group: Vec<usize> = (0..m).collect();
     for i in 0..m {
         for j in 0..i {
-            if found.correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
+            if correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
                 let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
                 group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }
@@ -103,7 +105,7 @@ pub(super) fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
     }
     let mut out = Vec::new();
     for g in 0..m {
-        let members: Vec<usize> = (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
+        let members: Vec<usize> = (0..m).filter(|i| group[*i] == g).map(|i| inside[i]).collect();
         if members.len() < 2 {
             continue;
         }

@@ -115,6 +115,7 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
     let log = log(&golden);
     let chains = Chain::all(&mechanism);
     let scheme = Scheme {
+        middle: false,
         step_s: golden["Ts"].as_f64().unwrap() / golden["substeps"].as_f64().unwrap(),
         sign_width: golden["w"].as_f64().unwrap(),
         load: LoadOf::Bodies,
@@ -172,7 +173,8 @@ fn fit_is_that_of_the_prototype() {
     let time = (0..command[0].len()).map(|k| k as f64 * ts).collect();
     let mut log = ServoLog::new("golden", time, command.clone(), position);
     log.start = Some(command.iter().map(|c| c[0]).collect());
-    let scheme = Scheme { step_s: ts / 4.0, sign_width: 0.01, load: LoadOf::Bodies, hold: Hold::Held };
+    let scheme =
+        Scheme { step_s: ts / 4.0, sign_width: 0.01, middle: false, load: LoadOf::Bodies, hold: Hold::Held };
     let names = [
         "kp_1",
         "kp_2",
