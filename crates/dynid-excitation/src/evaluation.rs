@@ -18,7 +18,7 @@ pub type Information = dynid_linalg::Mat;
 /// If the coefficients do not fit the problem.
 pub fn information(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) -> Information {
     with_grid(problem, samples, |grid| {
-        let motion = GridMotion::new(coefficients, &grid.basis);
+        let motion = GridMotion::new(problem, coefficients, &grid.basis);
         Observation::new(problem, &motion, 0.0).triangle
     })
 }
@@ -33,7 +33,7 @@ pub fn criterion_gradient(
     samples: usize,
 ) -> Option<(f64, Vec<Vec<f64>>)> {
     with_grid(problem, samples, |grid| {
-        let motion = GridMotion::new(coefficients, &grid.basis);
+        let motion = GridMotion::new(problem, coefficients, &grid.basis);
         let observation = Observation::new(problem, &motion, problem.sign_width);
         let (value, sensitivity) = problem.criterion.sensitivity(&observation.triangle, None)?;
         let adjoint = observation.adjoint(problem, &motion, problem.sign_width, &sensitivity);
@@ -65,7 +65,7 @@ pub fn limit_points(
     least: f64,
 ) -> Vec<LimitPoint> {
     with_grid(problem, samples, |grid| {
-        let values = grid.values_of(GridMotion::new(coefficients, &grid.basis));
+        let values = grid.values_of(GridMotion::new(problem, coefficients, &grid.basis));
         worst_points(problem, grid, &values, least)
     })
 }

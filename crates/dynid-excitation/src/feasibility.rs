@@ -18,6 +18,10 @@ pub enum LimitKind {
     Acceleration,
     /// Jerk of a coordinate.
     Jerk,
+    /// Position of a coordinate behind the loop that follows its command.
+    FollowedPosition,
+    /// Velocity of such a coordinate.
+    FollowedVelocity,
     /// A path constraint.
     Path(ConstraintKind),
 }
@@ -29,6 +33,8 @@ impl std::fmt::Display for LimitKind {
             LimitKind::Velocity => f.write_str("velocity"),
             LimitKind::Acceleration => f.write_str("acceleration"),
             LimitKind::Jerk => f.write_str("jerk"),
+            LimitKind::FollowedPosition => f.write_str("position behind the drive"),
+            LimitKind::FollowedVelocity => f.write_str("velocity behind the drive"),
             LimitKind::Path(ConstraintKind::Effort) => f.write_str("effort"),
             LimitKind::Path(ConstraintKind::HalfSpace) => f.write_str("distance from a plane"),
             LimitKind::Path(ConstraintKind::Box) => f.write_str("box"),
@@ -99,6 +105,10 @@ pub(crate) fn describe(problem: &Problem, id: LimitId) -> (LimitKind, String) {
             let kind = [LimitKind::Position, LimitKind::Velocity, LimitKind::Acceleration, LimitKind::Jerk];
             (kind[derivative], problem.coordinates[coordinate].clone())
         }
+        LimitId::Followed { coordinate, derivative } => {
+            let kind = [LimitKind::FollowedPosition, LimitKind::FollowedVelocity];
+            (kind[derivative], problem.coordinates[coordinate].clone())
+        }
         LimitId::Path { constraint, row } => {
             let row = &problem.constraints[constraint].rows()[row];
             (LimitKind::Path(row.kind), row.subject.clone())
@@ -123,7 +133,7 @@ pub(crate) fn worst_points(
         }
         let (kind, subject) = describe(problem, limit.id);
         let scale = match limit.id {
-            LimitId::Coordinate { .. } => None,
+            LimitId::Coordinate { .. } | LimitId::Followed { .. } => None,
             LimitId::Path { constraint, row } => {
                 let row = &problem.constraints[constraint].rows()[row];
                 Some((row.scale, row.unit))

@@ -5,6 +5,7 @@ use dynid_linalg::Mat;
 use crate::criterion::{inverse, singular_values};
 use crate::evaluation::{information, limit_points};
 use crate::feasibility::LimitPoint;
+use crate::model::ColumnInfo;
 use crate::problem::Problem;
 use crate::random::random_trajectory;
 
@@ -81,7 +82,21 @@ const RANDOM_SEED: u64 = 1 << 40;
 /// # Panics
 /// If the coefficients do not fit the problem.
 pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) -> Option<Forecast> {
-    let triangle = information(problem, coefficients, samples);
+    let of = |coefficients: &[Vec<f64>]| Some(information(problem, coefficients, samples));
+    forecast_by(problem, coefficients, samples, problem.model.columns(), &of)
+}
+
+/// [`forecast`] with the triangles of motions from elsewhere, such as a simulation of what the search takes for linear; `columns` are theirs.
+///
+/// `None` if that of the trajectory is singular or there is none. `samples` are those at which limits are looked at.
+pub fn forecast_by(
+    problem: &Problem,
+    coefficients: &[Vec<f64>],
+    samples: usize,
+    columns: &[ColumnInfo],
+    triangle_of: &dyn Fn(&[Vec<f64>]) -> Option<Mat>,
+) -> Option<Forecast> {
+    let triangle = triangle_of(coefficients)?;
     let inverse = inverse(&triangle)?;
     let stds = deviations(&inverse);
     if stds.iter().any(|s| !s.is_finite()) {
@@ -92,9 +107,7 @@ pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) ->
     let lengths: Vec<f64> = (0..n).map(|j| triangle.col_norm(j)).collect();
     let scaled = Mat::from_fn(n, n, |i, j| triangle[(i, j)] / lengths[j]);
     let (scaled_sigma, v) = singular_values(&scaled, true)?;
-    let columns: Vec<ColumnForecast> = problem
-        .model
-        .columns()
+    let columns: Vec<ColumnForecast> = columns
         .iter()
         .zip(&stds)
         .map(|(info, std)| ColumnForecast {
@@ -112,7 +125,7 @@ pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) ->
         confounded: confounded(&inverse, &stds, &columns),
         weakest: weakest(v.col(n - 1), &columns),
         active: limit_points(problem, coefficients, samples, ACTIVE - 1.0),
-        random: random_comparison(problem, &stds, samples),
+        random: random_comparison(problem, &stds, triangle_of),
         columns,
     })
 }
@@ -154,11 +167,15 @@ fn weakest(direction: &[f64], columns: &[ColumnForecast]) -> Vec<(String, f64)> 
     named
 }
 
-fn random_comparison(problem: &Problem, designed: &[f64], samples: usize) -> Option<RandomComparison> {
+fn random_comparison(
+    problem: &Problem,
+    designed: &[f64],
+    triangle_of: &dyn Fn(&[Vec<f64>]) -> Option<Mat>,
+) -> Option<RandomComparison> {
     let (mut mean, mut geometric, mut condition) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..RANDOM_TRAJECTORIES {
         let Some(coefficients) = random_trajectory(problem, RANDOM_SEED + k) else { continue };
-        let triangle = information(problem, &coefficients, samples);
+        let Some(triangle) = triangle_of(&coefficients) else { continue };
         let Some(inverse) = inverse(&triangle) else { continue };
         let ratios: Vec<f64> = deviations(&inverse).iter().zip(designed).map(|(r, d)| r / d).collect();
         let n = ratios.len() as f64;

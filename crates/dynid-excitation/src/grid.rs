@@ -14,10 +14,12 @@ pub(crate) struct GridMotion {
     pub(crate) samples: usize,
     /// Positions and their first three derivatives.
     pub(crate) channels: [Vec<f64>; 4],
+    /// Positions and velocities of what follows the motion; empty where the motion is that of the robot.
+    followed: [Vec<f64>; 2],
 }
 
 impl GridMotion {
-    pub(crate) fn new(coefficients: &[Vec<f64>], basis: &FourierBasis) -> Self {
+    pub(crate) fn new(problem: &Problem, coefficients: &[Vec<f64>], basis: &FourierBasis) -> Self {
         let samples = basis.times().len();
         let mut channels = [const { Vec::new() }; 4];
         for (derivative, channel) in channels.iter_mut().enumerate() {
@@ -26,7 +28,16 @@ impl GridMotion {
                 basis.evaluate(derivative, x, out);
             }
         }
-        GridMotion { samples, channels }
+        let mut followed = [const { Vec::new() }; 2];
+        for (coordinate, x) in coefficients.iter().enumerate() {
+            let Some(x) = after(problem, coordinate, x.clone(), false) else { continue };
+            for (derivative, channel) in followed.iter_mut().enumerate() {
+                let first = channel.len();
+                channel.resize(first + samples, 0.0);
+                basis.evaluate(derivative, &x, &mut channel[first..]);
+            }
+        }
+        GridMotion { samples, channels, followed }
     }
 
     pub(crate) fn block(&self, sign_width: f64) -> MotionBlock<'_> {
@@ -43,6 +54,21 @@ impl GridMotion {
     }
 }
 
+/// Coefficients of the motion of a coordinate behind its loop from those of its command; `transposed`: derivatives by the former turned into
+/// those by the latter. `None`: the coordinate is where its command is.
+fn after(problem: &Problem, coordinate: usize, mut x: Vec<f64>, transposed: bool) -> Option<Vec<f64>> {
+    let harmonics = (x.len() - 1) / 2;
+    for k in 0..harmonics {
+        let (re, im) = problem.model.response(coordinate, problem.base * (k + 1) as f64)?;
+        let im = if transposed { -im } else { im };
+        // a sin + b cos is the imaginary part of (a + j b) e^{jωt}.
+        let (a, b) = (x[1 + k], x[1 + harmonics + k]);
+        x[1 + k] = re * a - im * b;
+        x[1 + harmonics + k] = im * a + re * b;
+    }
+    Some(x)
+}
+
 /// Which limit, at which sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RowId {
@@ -55,6 +81,8 @@ pub(crate) struct RowId {
 pub(crate) enum LimitId {
     /// A derivative (0 to 3) of a coordinate.
     Coordinate { coordinate: usize, derivative: usize },
+    /// A derivative (0 or 1) of a coordinate behind the loop that follows its command.
+    Followed { coordinate: usize, derivative: usize },
     /// A row of a path constraint.
     Path { constraint: usize, row: usize },
 }
@@ -149,7 +177,7 @@ impl<'a> Grid<'a> {
     }
 
     pub(crate) fn motion(&self, z: &[f64]) -> GridMotion {
-        GridMotion::new(&self.map.coefficients(z), &self.basis)
+        GridMotion::new(self.problem, &self.map.coefficients(z), &self.basis)
     }
 
     /// Values of all limits.
@@ -162,12 +190,20 @@ impl<'a> Grid<'a> {
         let samples = motion.samples;
         let mut limits = Vec::new();
         for (coordinate, limit) in self.problem.limits.iter().enumerate() {
-            for derivative in 0..4 {
-                let Some(scale) = limit.of_derivative(derivative) else { continue };
+            let commanded = motion.channels.iter().enumerate().map(|(derivative, channel)| {
+                (LimitId::Coordinate { coordinate, derivative }, derivative, channel)
+            });
+            let followed = motion.followed.iter().enumerate().map(|(derivative, channel)| {
+                (LimitId::Followed { coordinate, derivative }, derivative, channel)
+            });
+            for (id, derivative, channel) in commanded.chain(followed) {
+                let Some(scale) = limit.of_derivative(derivative).filter(|_| !channel.is_empty()) else {
+                    continue;
+                };
                 let middle = if derivative == 0 { limit.middle() } else { 0.0 };
-                let channel = &motion.channels[derivative][coordinate * samples..][..samples];
+                let channel = &channel[coordinate * samples..][..samples];
                 limits.push(LimitValue {
-                    id: LimitId::Coordinate { coordinate, derivative },
+                    id,
                     lower: -self.bound,
                     upper: self.bound,
                     values: channel.iter().map(|x| (x - middle) / scale).collect(),
@@ -215,7 +251,7 @@ impl<'a> Grid<'a> {
                 // Only the nearer side can matter.
                 let (sign, bound) = if sides[0].1 <= sides[1].1 { sides[0] } else { sides[1] };
                 match limit.id {
-                    LimitId::Coordinate { .. } => {
+                    LimitId::Coordinate { .. } | LimitId::Followed { .. } => {
                         let mut row = self.coordinate_row(id);
                         row.values.iter_mut().for_each(|x| *x *= sign);
                         row.bound = bound;
@@ -234,11 +270,23 @@ impl<'a> Grid<'a> {
     }
 
     fn coordinate_row(&self, id: RowId) -> Row {
-        let LimitId::Coordinate { coordinate, derivative } = id.limit else {
-            unreachable!("asked of coordinate limits only")
+        let (coordinate, derivative) = match id.limit {
+            LimitId::Coordinate { coordinate, derivative } | LimitId::Followed { coordinate, derivative } => {
+                (coordinate, derivative)
+            }
+            LimitId::Path { .. } => unreachable!("asked of coordinate limits only"),
         };
         let scale = self.problem.limits[coordinate].of_derivative(derivative).unwrap_or(f64::INFINITY);
-        let mut values = self.map.row(coordinate, &self.basis, derivative, id.sample);
+        let behind = matches!(id.limit, LimitId::Followed { .. });
+        let of_basis = || self.basis.row(derivative, id.sample).to_vec();
+        let mut values = match behind.then(|| after(self.problem, coordinate, of_basis(), true)).flatten() {
+            Some(slopes) => {
+                let mut values = vec![0.0; self.map.range(coordinate).len()];
+                self.map.pull_back(coordinate, &slopes, &mut values);
+                values
+            }
+            None => self.map.row(coordinate, &self.basis, derivative, id.sample),
+        };
         values.iter_mut().for_each(|x| *x /= scale);
         Row { first: self.map.range(coordinate).start, values, bound: 0.0 }
     }

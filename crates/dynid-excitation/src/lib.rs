@@ -1,4 +1,7 @@
 //! Optimal excitation trajectories within all limits, and circles of a point in task space.
+//!
+//! [`RobotExcitation`] is for logs of motion and effort, [`ServoExcitation`] for those of commands and positions, [`ClosedExcitation`] for
+//! mechanisms with loops.
 
 mod closed;
 pub mod constraint;
@@ -18,6 +21,7 @@ mod random;
 mod restoration;
 mod robot;
 mod search;
+mod servo;
 mod start;
 mod task_space;
 
@@ -27,10 +31,11 @@ pub use duals::{DualConstraint, DualMap, DualModel, DualState};
 pub use dynid_motion::trajectory::MotionLimits;
 pub use evaluation::{Information, criterion_gradient, information, limit_points};
 pub use feasibility::{Blame, Infeasible, LimitKind, LimitPoint};
-pub use forecast::{ColumnForecast, ConfoundedPair, Forecast, RandomComparison, forecast};
+pub use forecast::{ColumnForecast, ConfoundedPair, Forecast, RandomComparison, forecast, forecast_by};
 pub use model::{ColumnInfo, ExcitationModel, Sensitivity};
 pub use parametrisation::{Parametrisation, StartConditions};
 pub use problem::{DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Problem, ProblemError};
 pub use random::random_trajectory;
 pub use robot::RobotExcitation;
+pub use servo::{PositionLoop, ServoColumn, ServoExcitation};
 pub use task_space::{CircleSettings, PointCircle, TaskSpaceError};

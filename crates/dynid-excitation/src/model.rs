@@ -33,6 +33,11 @@ pub trait ExcitationModel: Send + Sync {
     fn outputs(&self) -> usize;
     /// Columns of `W`; linearly independent.
     fn columns(&self) -> &[ColumnInfo];
+    /// Response of a coordinate's position to that of the trajectory at `ω` rad/s, real and imaginary part, where the trajectory is a command
+    /// that is followed; 1 at `ω = 0`. Position and velocity limits then hold for both. `None` (default): it is where the trajectory is.
+    fn response(&self, _coordinate: usize, _rate: f64) -> Option<(f64, f64)> {
+        None
+    }
     /// Fills `W`: row `output * samples + sample`, one column per parameter.
     ///
     /// # Panics

@@ -7,7 +7,7 @@
 //! [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
 //! [`trajectory`] holds the excitation trajectories. For motions that repeat:
 //! [`repetition`] finds after what time, [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics,
-//! [`savitzky_golay`] polynomials over any window.
+//! [`savitzky_golay`] polynomials over any window, and [`response`] is what linear systems make of them.
 //! [`faults`] finds what is wrong with a record. [`live`] forms states of a stream, sample by sample.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
@@ -29,6 +29,7 @@ pub mod mask;
 pub mod median;
 pub mod periods;
 pub mod repetition;
+pub mod response;
 pub mod savitzky_golay;
 pub mod shift;
 pub mod signal;

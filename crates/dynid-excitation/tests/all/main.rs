@@ -13,6 +13,7 @@ mod point_circle;
 mod problems;
 mod published;
 mod refusals;
+mod servo;
 mod statistics;
 mod support;
 mod task_space;
