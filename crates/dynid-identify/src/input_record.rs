@@ -21,6 +21,8 @@ dynid_record::words! {
         Trajectory = "trajectory",
         /// Known friction.
         Friction = "friction",
+        /// What was found of drives.
+        Drives = "drives",
     }
 }
 

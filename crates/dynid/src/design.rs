@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod config;
+mod drives;
 mod limits;
 mod loops;
 mod motion;
@@ -26,8 +27,11 @@ use crate::fault::DesignError;
 use crate::robot::{Robot, RobotOptions};
 pub use config::{
     BoxConfig, CapsuleConfig, ColumnConfig, ColumnsName, CriterionConfig, CriterionName, CylinderConfig,
-    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, SafetyConfig, SearchConfig, TrajectoryConfig,
+    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, MotionForm, SafetyConfig, SearchConfig,
+    TrajectoryConfig,
 };
+use drives::Drives;
+pub use drives::{FollowedJoint, FollowedRecord};
 pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;
 pub use record::{DesignRecord, DesignVerdict};
@@ -61,6 +65,11 @@ pub enum DesignStep {
         /// Time after which it reaches all that is wanted, s; `None`: not within ten thousand times its own.
         needed_s: Option<f64>,
     },
+    /// Going on within smaller limits, since drives lead the robot beyond them.
+    Within {
+        /// Which time, from 1.
+        round: usize,
+    },
     /// Predicting what the log will tell.
     Forecast,
 }
@@ -78,6 +87,9 @@ impl fmt::Display for DesignStep {
             DesignStep::Length { highest_hz, needed_s: None } => {
                 write!(f, "motion up to {highest_hz:.2} Hz: no length is enough")
             }
+            DesignStep::Within { round } => {
+                write!(f, "drives lead the robot beyond its limits: search {round} within smaller ones")
+            }
             DesignStep::Forecast => f.write_str("predicting what the log will tell"),
         }
     }
@@ -86,6 +98,7 @@ impl fmt::Display for DesignStep {
 /// A design that has been run.
 pub struct DesignRun {
     robot: Robot,
+    drives: Option<Drives>,
     set: RobotProblem,
     /// All starts that ran, by seed.
     pub starts: Vec<StartOutcome>,
@@ -108,6 +121,8 @@ pub struct DesignedTrajectory {
     pub uses: Vec<LimitPoint>,
     /// Approach, periods and return.
     pub motion: DesignedMotion,
+    /// Where the drives lead the robot, of designs for logs without efforts.
+    pub followed: Option<FollowedRecord>,
 }
 
 /// Designs an excitation trajectory.
@@ -120,8 +135,14 @@ pub struct DesignedTrajectory {
 pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Result<DesignRun, Error> {
     config.check()?;
     progress(DesignStep::Structure);
-    let robot = load(config)?;
-    let set = problem::problem(&robot, config)?;
+    let (robot, drives) = match drives::load(config)? {
+        Some((robot, drives)) => (robot, Some(drives)),
+        None => (load(config)?, None),
+    };
+    let mut set = match &drives {
+        Some(drives) => drives.problem(&robot, config)?,
+        None => problem::problem(&robot, config)?,
+    };
     let parking = problem::pose(&set, config)?;
     let mut file = Checkpointing::open(config, &set.safety.meshes)?;
     let settings = Settings {
@@ -152,7 +173,14 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
     if let Some(fault) = fault {
         return Err(fault);
     }
-    finished(robot, set, config, outcome, parking.as_deref(), progress)
+    let outcome = match (&drives, outcome) {
+        (Some(drives), Outcome::Found(found)) => {
+            let mut again = |round| progress(DesignStep::Within { round });
+            Outcome::Found(drives.within(&mut set.problem, &settings, found, &mut again)?)
+        }
+        (_, outcome) => outcome,
+    };
+    finished((robot, drives), set, config, outcome, parking.as_deref(), progress)
 }
 
 /// The robot of a configuration.
@@ -168,7 +196,7 @@ fn load(config: &DesignConfig) -> Result<Robot, Error> {
 
 /// A design from what its search found.
 fn finished(
-    robot: Robot,
+    (robot, drives): (Robot, Option<Drives>),
     set: RobotProblem,
     config: &DesignConfig,
     outcome: Outcome,
@@ -180,8 +208,17 @@ fn finished(
         Outcome::Found(found) => {
             progress(DesignStep::Forecast);
             let (coefficients, samples) = (found.coefficients, report_samples(config));
-            let forecast = forecast(&set.problem, &coefficients, samples).ok_or_else(|| {
-                Error::Unsupported("the designed trajectory leaves parameters unseen".to_owned())
+            let (forecast, followed) = match &drives {
+                Some(drives) => {
+                    let (forecast, followed) = drives.forecast(&set.problem, &coefficients, samples)?;
+                    (forecast, Some(followed))
+                }
+                None => (forecast(&set.problem, &coefficients, samples), None),
+            };
+            let forecast = forecast.ok_or_else(|| {
+                let limited =
+                    if drives.is_some() { ", or the drives are at their effort limits" } else { "" };
+                Error::Unsupported(format!("the designed trajectory leaves parameters unseen{limited}"))
             })?;
             let motion = DesignedMotion::new(&set, config, &coefficients, parking)?;
             let designed = DesignedTrajectory {
@@ -191,19 +228,31 @@ fn finished(
                 uses: limit_points(&set.problem, &coefficients, samples, f64::NEG_INFINITY),
                 motion,
                 coefficients,
+                followed,
             };
             (found.starts, Ok(designed))
         }
     };
-    Ok(DesignRun { robot, set, starts, outcome })
+    Ok(DesignRun { robot, drives, set, starts, outcome })
 }
 
 /// Samples of a period on which criterion and forecast are taken.
 fn report_samples(config: &DesignConfig) -> usize {
-    REPORT_SAMPLES.max(20 * config.trajectory.harmonics)
+    REPORT_SAMPLES.max(20 * config.form().harmonics)
 }
 
 impl DesignRun {
+    /// Writes what the drives are told, approach and return included; without drives, or a trajectory, nothing.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] if there are too many samples, [`Error::Output`].
+    pub fn write_commands(&self, path: &Path) -> Result<(), Error> {
+        let (Some(drives), Ok(designed)) = (&self.drives, &self.outcome) else { return Ok(()) };
+        let sampled = designed.motion.sampled()?;
+        let told = drives.told(&sampled.q);
+        Ok(dynid_io::trajectory::write_commands(path, &designed.motion.joints, &sampled.time, &told)?)
+    }
+
     /// Capsules about the links of the robot, as they are kept apart and above the floor; none if both are turned off.
     pub fn capsules(&self) -> &[LinkCapsule] {
         &self.set.safety.capsules

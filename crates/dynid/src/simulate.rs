@@ -3,6 +3,7 @@
 mod channels;
 mod clearance;
 mod closed_loop;
+mod drives;
 mod elastic;
 mod fleet;
 mod fleet_table;
@@ -22,6 +23,7 @@ use crate::elements::{ElementPlan, LOAD, REACTION_FRICTION};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
+pub use drives::simulate_drives;
 pub use fleet::{PlannedChange, VirtualFleet, VirtualLog};
 pub use fleet_table::FleetTable;
 pub use settings::{
@@ -41,6 +43,8 @@ pub struct SimulatedLog {
     pub undriven: Vec<bool>,
     /// Time, s.
     pub time: Vec<f64>,
+    /// Per joint: what its drive is told, in the numbers of its encoder; of logs by [`simulate_drives`], which hold no effort.
+    pub command: Option<Vec<Vec<f64>>>,
     /// Per joint: position as the encoder reads it.
     pub position: Vec<Vec<f64>>,
     /// Per joint: velocity signal, where it is asked for.
@@ -105,6 +109,10 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     settings.check_effect()?;
     if settings.fleet.is_some() {
         return Err(Error::setting("fleet", "no table beside a single log", "[fleet]"));
+    }
+    if let Some(drives) = &settings.drives {
+        let expected = "no file: `simulate_drives` is for drives that are told positions";
+        return Err(Error::setting("drives", expected, drives.display()));
     }
     let mechanism = &robot.mechanism;
     if robot.closed.is_none() && mechanism.positions() != mechanism.rates() {
@@ -299,6 +307,7 @@ fn by_inverse_dynamics(
         joints: model.joints().iter().map(|j| j.name.clone()).collect(),
         undriven,
         time: (0..samples).map(|s| s as f64 / settings.rate_hz).collect(),
+        command: None,
         position,
         velocity: None,
         effort,

@@ -41,10 +41,10 @@ pub(crate) struct DesignedArgs {
     /// Write the motion also for what plays it, comma separated.
     #[arg(long, value_enum, value_name = "FORMAT,..", value_delimiter = ',')]
     pub(crate) also: Vec<PlaybackArg>,
-    /// Harmonics (default: 5).
+    /// Harmonics (default: 5; with drives 20).
     #[arg(long, value_name = "N")]
     pub(crate) harmonics: Option<usize>,
-    /// Rate of commanded and recorded samples, Hz (default: 500).
+    /// Rate of commanded and recorded samples, Hz (default: 500; with drives 100).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate_hz: Option<f64>,
     /// Let the motion start and end at speed instead of at rest.
@@ -97,7 +97,7 @@ pub(crate) struct DesignArgs {
     /// Output folder (default: dynid-design).
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub(crate) out: Option<PathBuf>,
-    /// Period, s (default: 20).
+    /// Period, s (default: 20; with drives 10).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) period: Option<f64>,
     /// Recorded periods (default: 1).
@@ -109,12 +109,15 @@ pub(crate) struct DesignArgs {
     /// Parameters that count (default: all).
     #[arg(long, value_enum)]
     pub(crate) columns: Option<ColumnsArg>,
-    /// Standard deviation of the effort's noise at all joints, N m or N.
+    /// Standard deviation of the effort's noise at all joints, N m or N; with drives of the positions, rad or m.
     #[arg(long, value_name = "STD", allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
     /// Trajectory that is recorded as well, so that its information counts; repeat for several.
     #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
     pub(crate) earlier: Vec<PathBuf>,
+    /// What `dynid servo` found, its servo.json: the log will hold commands and positions, no effort.
+    #[arg(long, value_name = "SERVO.json", value_hint = ValueHint::FilePath)]
+    pub(crate) drives: Option<PathBuf>,
     /// Elements at every joint, comma separated; `none`: rigid bodies alone.
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint, comma separated; `none`: rigid bodies alone."))]
     pub(crate) elements: Option<Vec<String>>,

@@ -20,6 +20,9 @@ pub(crate) struct SimulateArgs {
     /// `.csv` or `.csv.gz` (`dynid motion` writes them).
     #[arg(long, value_name = "TRAJECTORY", value_hint = ValueHint::FilePath)]
     pub(crate) follow: Option<PathBuf>,
+    /// Tell drives the positions of the trajectory, as `dynid servo` found them in its servo.json: the log holds commands and positions, no effort.
+    #[arg(long, value_name = "SERVO.json", value_hint = ValueHint::FilePath, conflicts_with_all = ["closed_loop", "fleet"])]
+    pub(crate) drives: Option<PathBuf>,
     /// Length, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "follow")]
     pub(crate) duration: Option<f64>,

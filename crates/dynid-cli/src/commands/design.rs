@@ -21,8 +21,11 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let config = configuration(args)?;
     config.check()?;
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let files = MotionFiles::new(&out, "design.json", &args.designed);
-    let earlier = config.earlier.iter().map(PathBuf::as_path);
+    let mut files = MotionFiles::new(&out, "design.json", &args.designed);
+    if config.has_drives() {
+        files.all.push(out.join("commands.csv"));
+    }
+    let earlier = config.earlier.iter().chain(&config.drives).map(PathBuf::as_path);
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
     if let Some(checkpoint) = &config.search.checkpoint {
         let results = files.all.iter().map(|file| ("--out", file.as_path()));
@@ -47,6 +50,9 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let motion = run.outcome.as_ref().ok().map(|designed| &designed.motion);
     let text = serde_json::to_string_pretty(&record).map_err(|e| Failure::Output(e.into()))? + "\n";
     let all = files.write(&set, motion, &text, &report)?;
+    if config.has_drives() {
+        run.write_commands(set.staged(files.all.len() - 1))?;
+    }
     let written = set.publish()?;
     let notes = Notes::new(print.quiet);
     notes.warnings(&record.verdict.warnings);
@@ -109,7 +115,7 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
         config.out.clone_from(&args.out);
     }
     let t = &mut config.trajectory;
-    t.period_s = args.period.unwrap_or(t.period_s);
+    t.period_s = args.period.or(t.period_s);
     t.periods = args.periods.unwrap_or(t.periods);
     match args.criterion {
         Some(CriterionArg::RelativeStd) => config.criterion.name = Some(CriterionName::RelativeStd),
@@ -130,6 +136,9 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
         config.criterion.noise = PerJoint::All(noise);
     }
     config.earlier.extend(args.earlier.iter().cloned());
+    if args.drives.is_some() {
+        config.drives.clone_from(&args.drives);
+    }
     if args.elements.is_some() {
         config.elements.default = element_names(args.elements.as_deref());
     }
@@ -157,8 +166,8 @@ pub(super) fn designed(input: &Path, args: &DesignedArgs) -> Result<DesignConfig
         }
     };
     let t = &mut config.trajectory;
-    t.harmonics = args.harmonics.unwrap_or(t.harmonics);
-    t.sample_rate_hz = args.rate_hz.unwrap_or(t.sample_rate_hz);
+    t.harmonics = args.harmonics.or(t.harmonics);
+    t.sample_rate_hz = args.rate_hz.or(t.sample_rate_hz);
     t.rest &= !args.no_rest;
     if args.park && t.parking.is_none() {
         t.parking = Some(std::collections::BTreeMap::new());
@@ -226,7 +235,8 @@ fn summary(record: &DesignRecord) -> String {
         let header = ["parameter", "nominal", "std", "unit", "std, %"];
         out.push(table::aligned(&header, &rows).trim_end().to_owned());
     }
-    for pair in &record.confounded {
+    // Of drives the warnings name groups.
+    for pair in record.confounded.iter().filter(|_| record.followed.is_none()) {
         out.push(format!(
             "hardly told apart: {} and {} (correlation {:.3})",
             pair.names[0], pair.names[1], pair.correlation

@@ -16,7 +16,7 @@ const DEFAULT_OUT: &str = "dynid-next";
 
 pub(crate) fn run(args: &NextArgs) -> Result<u8, Failure> {
     let mut config = designed(&args.input, &args.designed)?;
-    config.trajectory.period_s = args.period.unwrap_or(config.trajectory.period_s);
+    config.trajectory.period_s = args.period.or(config.trajectory.period_s);
     config.check()?;
     if args.out.is_some() {
         config.out.clone_from(&args.out);

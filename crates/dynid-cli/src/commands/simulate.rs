@@ -5,17 +5,19 @@ use std::path::{Path, PathBuf};
 use dynid::sim::clearance::ContactEventKind;
 use dynid::simulate::{
     ClearanceSummary, ExperimentSummary, FleetTable, SimulateMode, SimulateSettings, SimulatedLog,
-    VirtualFleet, VirtualLog, simulate,
+    VirtualFleet, VirtualLog, simulate, simulate_drives,
 };
 use dynid_terminal::message::{Failure, Notes, json};
 use dynid_terminal::outputs::{self, Outputs, is_stdout};
 use dynid_terminal::progress::Progress;
 
 use super::{demand_stdout, load_robot};
-use crate::args::SimulateArgs;
+use crate::args::{RobotArgs, SimulateArgs};
 
 /// Columns of efforts; joints without a drive have none.
 const EFFORT: &str = "tau";
+/// Columns of efforts of drives that nobody measures.
+const DRIVE_EFFORT: &str = "tau_drive";
 
 pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     let settings = settings(args)?;
@@ -30,23 +32,35 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = std::iter::once(&args.robot.robot)
         .chain(&args.config)
         .chain(&args.follow)
+        .chain(&args.drives)
         .map(PathBuf::as_path)
         .collect();
     let set = outputs::prepare_files(&files, &inputs, args.force)?;
     demand_stdout(args.print, &set)?;
-    let robot = load_robot(&args.robot)?;
     let progress = Progress::new(args.print.quiet);
-    progress.doing("simulating");
-    let log = simulate(&robot, &settings)?;
+    let log = if settings.drives.is_some() {
+        progress.doing("simulating");
+        told(args, &settings)?
+    } else {
+        let robot = load_robot(&args.robot)?;
+        progress.doing("simulating");
+        simulate(&robot, &settings)?
+    };
     drop(progress);
     let mut signals = vec![("q", &log.position), (EFFORT, &log.effort)];
     if let Some(velocity) = &log.velocity {
         signals.insert(1, ("dq", velocity));
     }
+    if let Some(command) = &log.command {
+        signals.insert(0, ("cmd", command));
+    }
     write(&set, 0, &log, &signals, &log.channels)?;
     if args.clean.is_some() {
         let [q, dq, ddq, tau] = &log.clean;
-        let signals = [("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)];
+        let mut signals = vec![("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)];
+        if log.command.is_some() {
+            signals = vec![("q", q), ("dq", dq), (DRIVE_EFFORT, tau)];
+        }
         write(&set, 1, &log, &signals, &log.clean_channels)?;
     }
     if args.truth.is_some() {
@@ -60,6 +74,18 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// A log of drives that are told positions.
+fn told(args: &SimulateArgs, settings: &SimulateSettings) -> Result<SimulatedLog, Failure> {
+    let RobotArgs { robot, floating_base, couple_mimics, lock, gravity } = &args.robot;
+    if *floating_base || *couple_mimics {
+        return Err(Failure::Usage(
+            "--drives: expected neither --floating-base nor --couple-mimics beside it".to_owned(),
+            "the base is held where the robot file puts it, and mimic joints follow their leaders",
+        ));
+    }
+    Ok(simulate_drives(robot, &lock.iter().cloned().collect(), *gravity, settings)?)
+}
+
 /// Settings of the configuration, those of the command line over them.
 fn settings(args: &SimulateArgs) -> Result<SimulateSettings, Failure> {
     let mut settings = match &args.config {
@@ -71,6 +97,9 @@ fn settings(args: &SimulateArgs) -> Result<SimulateSettings, Failure> {
     }
     if args.follow.is_some() {
         settings.follow.clone_from(&args.follow);
+    }
+    if args.drives.is_some() {
+        settings.drives.clone_from(&args.drives);
     }
     settings.duration_s = args.duration.unwrap_or(settings.duration_s);
     settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
@@ -190,6 +219,7 @@ fn read_settings(path: &Path) -> Result<SimulateSettings, Failure> {
     let mut settings = SimulateSettings::parse(&text, &path.display().to_string())?;
     let folder = path.parent().unwrap_or(Path::new(""));
     settings.follow = settings.follow.map(|f| folder.join(f));
+    settings.drives = settings.drives.map(|f| folder.join(f));
     Ok(settings)
 }
 

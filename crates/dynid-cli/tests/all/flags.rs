@@ -725,6 +725,8 @@ fn cases() -> Vec<Case> {
             "elbow",
         ),
         refused("design --earlier", "design small.toml --earlier none.json", "none.json"),
+        refused("design --drives", "design small.toml --drives none.json", "none.json"),
+        refused("simulate --drives", "simulate arm.urdf --out s.csv --drives none.json", "none.json"),
         case(
             "design --time-budget",
             "design small.toml --starts 3",

@@ -65,6 +65,36 @@ pub fn write_csv_with_channels(
     writer.finish()
 }
 
+/// Writes what drives are told: `t`, then `cmd_<joint>` of every joint. Beside readings in the same rows it is a log of commands and positions.
+///
+/// `commands`: per joint a value per sample.
+///
+/// # Errors
+/// [`OutputError`]: names or commands of another number, a failed write.
+pub fn write_commands(
+    path: impl AsRef<Path>,
+    joints: &[String],
+    time: &[f64],
+    commands: &[Vec<f64>],
+) -> Result<(), OutputError> {
+    let path = path.as_ref();
+    check_shape(path, "joint names", commands.len(), joints.len())?;
+    for (joint, values) in joints.iter().zip(commands) {
+        check_shape(path, &format!("commands of `{joint}`"), time.len(), values.len())?;
+    }
+    let header: Vec<String> =
+        std::iter::once("t".to_owned()).chain(joints.iter().map(|j| format!("cmd_{j}"))).collect();
+    let mut writer = RowWriter::create(path, &header)?;
+    let mut row = Vec::with_capacity(header.len());
+    for (s, t) in time.iter().enumerate() {
+        row.clear();
+        row.push(*t);
+        row.extend(commands.iter().map(|values| values[s]));
+        writer.row(&row)?;
+    }
+    writer.finish()
+}
+
 /// Fails unless the counts agree.
 pub(super) fn check_shape(path: &Path, what: &str, expected: usize, found: usize) -> Result<(), OutputError> {
     if expected == found {

@@ -9,7 +9,7 @@ mod samples;
 mod schema;
 
 pub use coefficients::{Leg, TrajectoryFile, TrajectoryJoint};
-pub use csv::{write_csv, write_csv_with_channels};
+pub use csv::{write_commands, write_csv, write_csv_with_channels};
 pub use error::TrajectoryFileError;
 pub use playback::Playback;
 pub use ros::{JointTrajectory, write_ros_json, write_ros_yaml};

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Error;
 use crate::config::{ElementsConfig, PerJoint, toml_file};
+use crate::servo::config::DriveConfig;
 use crate::settings::lists::{exactly, just};
 
 /// Seeds count up from start to start.
@@ -49,6 +50,12 @@ pub struct DesignConfig {
     pub criterion: CriterionConfig,
     /// Trajectories that will be or were recorded as well: their information counts. Files of earlier designs.
     pub earlier: Vec<PathBuf>,
+    /// What `dynid servo` found, its `servo.json`, relative to the configuration: the log will hold commands and positions and no effort, and the
+    /// motion is for what such a log tells of gains, rotor inertia, friction and delay.
+    pub drives: Option<PathBuf>,
+    /// The same where no log has been identified yet: what is known of the drives, as for `dynid servo`. Guesses stand under `values`
+    /// (`j1.position_gain`, `j1.coulomb`, ..).
+    pub servo: Option<DriveConfig>,
     /// The search.
     pub search: SearchConfig,
 }
@@ -57,10 +64,12 @@ pub struct DesignConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrajectoryConfig {
-    /// Period, s. Default 20.
-    pub period_s: f64,
-    /// Harmonics. Default 5.
-    pub harmonics: usize,
+    /// Period, s. Default 20; with drives 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Harmonics. Default 5; with drives, whose lags only fast motion tells apart, 20.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub harmonics: Option<usize>,
     /// Periods that are recorded. Default 1.
     pub periods: usize,
     /// Velocity and acceleration are zero at start and end. Default true.
@@ -72,8 +81,9 @@ pub struct TrajectoryConfig {
     /// Pose that the robot comes from and goes back to, by joint; joints left out are at zero, or the nearest position
     /// within their limits. Default: no approach and no return.
     pub parking: Option<BTreeMap<String, f64>>,
-    /// Rate of the commanded and recorded samples, Hz. Default 500.
-    pub sample_rate_hz: f64,
+    /// Rate of the commanded and recorded samples, Hz. Default 500; with drives 100.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_rate_hz: Option<f64>,
     /// Frames whose paths are drawn. Default: the last link of every branch.
     pub frames: Vec<String>,
 }
@@ -81,17 +91,28 @@ pub struct TrajectoryConfig {
 impl Default for TrajectoryConfig {
     fn default() -> Self {
         TrajectoryConfig {
-            period_s: 20.0,
-            harmonics: 5,
+            period_s: None,
+            harmonics: None,
             periods: 1,
             rest: true,
             zero_jerk: false,
             start_pose: BTreeMap::new(),
             parking: None,
-            sample_rate_hz: 500.0,
+            sample_rate_hz: None,
             frames: Vec::new(),
         }
     }
+}
+
+/// Period, harmonics and rate of a designed motion: what is stated, else the defaults.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionForm {
+    /// Period, s.
+    pub period_s: f64,
+    /// Harmonics.
+    pub harmonics: usize,
+    /// Rate of the commanded and recorded samples, Hz.
+    pub sample_rate_hz: f64,
 }
 
 /// Limits of joints. What is not given comes from the robot file.
@@ -289,7 +310,7 @@ pub struct CriterionConfig {
     /// Parameters that count. Default `all`.
     pub columns: ColumnsName,
     /// Standard deviation of the effort's noise, N m or N. Default: 1 % of the effort limit, else of the largest nominal
-    /// effort.
+    /// effort. With drives that of the positions, rad or m. Default: the residual of `drives`, else the rounding of an encoder with 4096 counts.
     pub noise: PerJoint,
     /// Time after which noise is independent of what it was, s. Default 0: every sample counts.
     pub correlation_time_s: f64,
@@ -350,7 +371,7 @@ impl DesignConfig {
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.search.checkpoint = config.search.checkpoint.map(|c| folder.join(c));
-        for path in config.earlier.iter_mut().chain(&mut config.package_dirs) {
+        for path in config.earlier.iter_mut().chain(&mut config.package_dirs).chain(&mut config.drives) {
             *path = folder.join(&path);
         }
         Ok(config)
@@ -423,15 +444,32 @@ impl DesignConfig {
         }
     }
 
+    /// Whether the motion is for drives that log positions and no effort.
+    pub fn has_drives(&self) -> bool {
+        self.drives.is_some() || self.servo.is_some()
+    }
+
+    /// Period, harmonics and rate: what is stated, else the defaults.
+    pub fn form(&self) -> MotionForm {
+        let (period_s, harmonics, sample_rate_hz) =
+            if self.has_drives() { (10.0, 20, 100.0) } else { (20.0, 5, 500.0) };
+        let t = &self.trajectory;
+        MotionForm {
+            period_s: t.period_s.unwrap_or(period_s),
+            harmonics: t.harmonics.unwrap_or(harmonics),
+            sample_rate_hz: t.sample_rate_hz.unwrap_or(sample_rate_hz),
+        }
+    }
+
     /// Checks numbers that need no robot.
     ///
     /// # Errors
     /// [`Error::Setting`].
     pub fn check(&self) -> Result<(), Error> {
-        let t = &self.trajectory;
+        let (t, form) = (&self.trajectory, self.form());
         let positive = [
-            ("trajectory.period_s", t.period_s),
-            ("trajectory.sample_rate_hz", t.sample_rate_hz),
+            ("trajectory.period_s", form.period_s),
+            ("trajectory.sample_rate_hz", form.sample_rate_hz),
             ("limits.share", self.limits.share),
             ("criterion.mix", self.criterion.mix[0]),
         ];
@@ -458,7 +496,7 @@ impl DesignConfig {
             }
         }
         let counts = [
-            ("trajectory.harmonics", t.harmonics, 2, 50),
+            ("trajectory.harmonics", form.harmonics, 2, 50),
             ("trajectory.periods", t.periods, 1, 10_000),
             ("search.starts", self.search.starts, 1, 100_000),
         ];
@@ -477,15 +515,16 @@ impl DesignConfig {
                 return Err(Error::setting(&name, "a finite number", x));
             }
         }
-        let samples = t.period_s * t.sample_rate_hz;
-        if samples < 4.0 * t.harmonics as f64 {
+        let MotionForm { period_s, harmonics, sample_rate_hz } = form;
+        let samples = period_s * sample_rate_hz;
+        if samples < 4.0 * harmonics as f64 {
             let expected =
-                format!("at least {} Hz: four samples per harmonic", 4.0 * t.harmonics as f64 / t.period_s);
-            return Err(Error::setting("trajectory.sample_rate_hz", &expected, t.sample_rate_hz));
+                format!("at least {} Hz: four samples per harmonic", 4.0 * harmonics as f64 / period_s);
+            return Err(Error::setting("trajectory.sample_rate_hz", &expected, sample_rate_hz));
         }
         if samples * t.periods as f64 > 1e7 {
             let expected = "at most 1e7 samples in all periods";
-            return Err(Error::setting("trajectory.sample_rate_hz", expected, t.sample_rate_hz));
+            return Err(Error::setting("trajectory.sample_rate_hz", expected, sample_rate_hz));
         }
         self.check_effect()?;
         if let Some(height) = self.safety.floor_height_m.filter(|h| !h.is_finite()) {

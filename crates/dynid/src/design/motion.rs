@@ -58,7 +58,7 @@ impl DesignedMotion {
         coefficients: &[Vec<f64>],
         parking: Option<&[f64]>,
     ) -> Result<Self, Error> {
-        let t = &config.trajectory;
+        let (t, rate_hz) = (&config.trajectory, config.form().sample_rate_hz);
         let problem = &set.problem;
         let order = RowOrder::default();
         let record =
@@ -75,18 +75,18 @@ impl DesignedMotion {
             motion: record()?,
             approach: None,
             back: None,
-            sample_rate_hz: Some(t.sample_rate_hz),
+            sample_rate_hz: Some(rate_hz),
         };
         let Some(parking) = parking else {
             let sequence = file.sequence()?;
-            return Ok(Self::of(set, file, sequence, t.sample_rate_hz, Vec::new()));
+            return Ok(Self::of(set, file, sequence, rate_hz, Vec::new()));
         };
         let shortest = Sequence::parked(parking, Box::new(record()?), &problem.limits)?;
         let length = |phase: Phase| shortest.span(phase).map_or(0.0, |s| s.end - s.start);
         let (mut approach, mut back) = (length(Phase::Approach), length(Phase::Return));
         let mut faults = Vec::new();
         // The last sample is that of the end: a sampled motion comes to rest.
-        let on_grid = |end: f64| (end * t.sample_rate_hz - 1e-6).ceil() / t.sample_rate_hz;
+        let on_grid = |end: f64| (end * rate_hz - 1e-6).ceil() / rate_hz;
         let recorded = length(Phase::Record);
         for _ in 0..ATTEMPTS {
             let coming = on_grid(approach);
@@ -105,14 +105,14 @@ impl DesignedMotion {
             let (longer_approach, longer_back) =
                 (slower(Phase::Approach.name()), slower(Phase::Return.name()));
             if !longer_approach && !longer_back {
-                return Ok(Self::of(set, file, sequence, t.sample_rate_hz, found));
+                return Ok(Self::of(set, file, sequence, rate_hz, found));
             }
             approach *= if longer_approach { SLOWER } else { 1.0 };
             back *= if longer_back { SLOWER } else { 1.0 };
             faults = found;
         }
         let sequence = file.sequence()?;
-        Ok(Self::of(set, file, sequence, t.sample_rate_hz, faults))
+        Ok(Self::of(set, file, sequence, rate_hz, faults))
     }
 
     fn of(

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use dynid_excitation::criterion::{Criterion, Measure};
 use dynid_excitation::{
-    DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information, MotionLimits, Problem,
-    RobotExcitation, StartConditions, information,
+    ColumnInfo, DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information, MotionLimits,
+    Problem, RobotExcitation, StartConditions, information,
 };
 use dynid_io::{SourceFile, TrajectoryFile};
 use dynid_model::{BaseParameters, BaseSettings, ClosedModel, EffortModel, RobotModel, TreeModel};
@@ -97,7 +97,7 @@ pub(super) struct Subject {
     /// Values of all its parameters; `None` if nothing states inertias.
     pub(super) nominal: Option<Vec<f64>>,
     /// Parameters that are to become visible.
-    pub(super) excitation: RobotExcitation,
+    pub(super) excitation: Box<dyn ExcitationModel>,
     /// Standard deviations of the outputs' noise, where they are known from logs.
     pub(super) noise: Option<Vec<f64>>,
 }
@@ -113,8 +113,8 @@ pub(super) fn refuse(robot: &Robot) -> Result<(), Error> {
     refuse_springs(robot)
 }
 
-/// The model of the robot file and of the elements of a configuration.
-fn subject(robot: &Robot, config: &DesignConfig) -> Result<Subject, Error> {
+/// The model of the robot file and of the elements of a configuration, and its columns.
+fn subject(robot: &Robot, config: &DesignConfig) -> Result<(Subject, RobotExcitation), Error> {
     let mechanism = &robot.mechanism;
     let all = mechanism.rate_names();
     let mut elements = robot.elements.with_ideal_bearings();
@@ -139,14 +139,14 @@ fn subject(robot: &Robot, config: &DesignConfig) -> Result<Subject, Error> {
         true => Some(nominal_parameters(&model, &plan, &config.values)?),
         false => None,
     };
-    Ok(Subject { excitation: columns(config, &model, nominal.as_deref()), model, nominal, noise: None })
+    let excitation = columns(config, &model, nominal.as_deref());
+    Ok((Subject { excitation: Box::new(excitation.clone()), model, nominal, noise: None }, excitation))
 }
 
 /// The problem of a design from a robot file.
 pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
     refuse(robot)?;
-    let subject = subject(robot, config)?;
-    let excitation = subject.excitation.clone();
+    let (subject, excitation) = subject(robot, config)?;
     let name = match config.criterion.name {
         Some(CriterionName::RelativeStd) if subject.nominal.is_none() => {
             return Err(Error::setting(
@@ -159,9 +159,9 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         None if subject.nominal.is_some() => CriterionName::RelativeStd,
         None => CriterionName::UnitCondition,
     };
-    let criterion = criterion(name, config, &excitation)?;
+    let criterion = criterion(name, config, excitation.columns())?;
     let mut set = problem_of(robot, config, subject, name, criterion)?;
-    let spacing = config.criterion.correlation_time_s.max(1.0 / config.trajectory.sample_rate_hz);
+    let spacing = config.criterion.correlation_time_s.max(1.0 / config.form().sample_rate_hz);
     set.problem.prior = earlier(config, &set.problem, &excitation, spacing, &mut set.earlier)?;
     Ok(set)
 }
@@ -208,22 +208,22 @@ pub(super) fn problem_of(
         Some(noise) => noise,
         None => noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?,
     };
-    let t = &config.trajectory;
-    let spacing = config.criterion.correlation_time_s.max(1.0 / t.sample_rate_hz);
+    let form = config.form();
+    let spacing = config.criterion.correlation_time_s.max(1.0 / form.sample_rate_hz);
     let problem = Problem {
         criterion,
         coordinates: joints.clone(),
         limits,
         constraints,
-        base: std::f64::consts::TAU / t.period_s,
-        harmonics: t.harmonics,
+        base: std::f64::consts::TAU / form.period_s,
+        harmonics: form.harmonics,
         start: start_conditions(config, &joints)?,
         output_weights: noise.iter().map(|s| 1.0 / s).collect(),
-        effective_samples: t.periods as f64 * t.period_s / spacing,
+        effective_samples: config.trajectory.periods as f64 * form.period_s / spacing,
         prior: None,
         sign_width: DEFAULT_SIGN_WIDTH,
-        samples: DEFAULT_SAMPLES_PER_HARMONIC * t.harmonics,
-        model: Box::new(excitation),
+        samples: DEFAULT_SAMPLES_PER_HARMONIC * form.harmonics,
+        model: excitation,
     };
     Ok(RobotProblem {
         problem,
@@ -300,12 +300,11 @@ fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64
     }
 }
 
-fn criterion(
+pub(super) fn criterion(
     name: CriterionName,
     config: &DesignConfig,
-    model: &RobotExcitation,
+    columns: &[ColumnInfo],
 ) -> Result<Criterion, Error> {
-    let columns = model.columns();
     Ok(match name {
         CriterionName::RelativeStd => {
             let size = |k: usize| columns[k].nominal.map_or(0.0, f64::abs);

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::config::{CriterionName, DesignConfig};
 use super::safety::SafetyRecord;
-use super::{DesignRun, DesignedTrajectory};
+use super::{DesignRun, DesignedTrajectory, FollowedRecord};
 use crate::Error;
 use crate::estimate::{InputKind, InputRecord, Provenance};
 
@@ -59,7 +59,9 @@ pub struct DesignRecord {
     pub starts: Vec<StartRecord>,
     /// Why there is no trajectory.
     pub infeasible: Option<InfeasibleRecord>,
-    /// Noise that the forecast assumes, per joint.
+    /// Where the drives lead the robot, of designs for logs without efforts.
+    pub followed: Option<FollowedRecord>,
+    /// Noise that the forecast assumes, per joint: of efforts, N m or N; of designs for logs without them of positions, rad or m.
     pub noise: Vec<f64>,
     /// Where all this comes from.
     pub provenance: Provenance,
@@ -233,11 +235,49 @@ impl From<&LimitPoint> for LimitRecord {
     }
 }
 
+/// Share of the samples at an effort limit that is told.
+const AT_LIMIT: f64 = 0.05;
+
+/// What to know before commands are given to drives, in words.
+fn doubts(followed: &FollowedRecord) -> Vec<String> {
+    let mut out = Vec::new();
+    let turned: Vec<&str> = followed
+        .joints
+        .iter()
+        .filter(|j| j.direction != 1.0 || j.zero != 0.0)
+        .map(|j| j.joint.as_str())
+        .collect();
+    if !turned.is_empty() {
+        out.push(format!(
+            "trajectories hold positions of the robot file's joints; commands.csv holds what the drives are told, direction (q - zero), \
+             which is another number for {}",
+            turned.join(", ")
+        ));
+    }
+    for joint in followed.joints.iter().filter(|j| j.at_limit > AT_LIMIT) {
+        out.push(format!(
+            "the drive of `{}` is at its effort limit for {:.0} % of the motion, which then tells nothing but the limit: lower `acceleration` or \
+             `share`",
+            joint.joint,
+            100.0 * joint.at_limit
+        ));
+    }
+    for group in &followed.groups {
+        out.push(format!("will be known together only: {}; {}", group.members.join(", "), group.remedy));
+    }
+    if !followed.unseen.is_empty() {
+        out.push(format!("no reading will depend on {}", followed.unseen.join(", ")));
+    }
+    out
+}
+
 impl DesignRun {
     fn inputs(&self) -> Vec<InputRecord> {
         let mut inputs = InputRecord::of_robot(&self.robot);
         inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of(InputKind::Mesh, source)));
         inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of(InputKind::Trajectory, source)));
+        let drives = self.drives.iter().filter_map(|d| d.source.as_ref());
+        inputs.extend(drives.map(|source| InputRecord::of(InputKind::Drives, source)));
         inputs
     }
 
@@ -250,7 +290,10 @@ impl DesignRun {
         let designed = self.outcome.as_ref().ok();
         let forecast = designed.map(|d| &d.forecast);
         let logarithm = designed.and_then(|d| self.starts[d.best].criterion);
-        let columns = set.problem.model.columns().len();
+        let named = set.problem.model.columns();
+        // Offsets and zeros are only there to be told apart from what drives are asked for.
+        let counted = |c: &&dynid_excitation::ColumnInfo| self.drives.is_none() || c.nominal.is_some();
+        let columns = named.iter().filter(counted).count();
         let leg = |leg: &Option<dynid_io::trajectory::Leg>| leg.as_ref().map(|l| l.duration_s);
         let mut limits: Vec<LimitRecord> =
             designed.map_or_else(Vec::new, |d| d.uses.iter().map(LimitRecord::from).collect());
@@ -262,17 +305,23 @@ impl DesignRun {
             verdict: self.verdict(),
             criterion: CriterionRecord {
                 name: set.criterion,
-                meaning: set.criterion.meaning(),
+                meaning: match set.criterion {
+                    CriterionName::RelativeStd if self.drives.is_some() => {
+                        "root of the mean squared relative standard deviation of gains, rotor inertia, friction and delay, the drives' loops taken \
+                         for linear"
+                    }
+                    other => other.meaning(),
+                },
                 value: logarithm.map(|l| set.criterion.figure(l, columns)),
                 logarithm,
             },
             trajectory: TrajectoryRecord {
-                period_s: config.trajectory.period_s,
-                harmonics: config.trajectory.harmonics,
+                period_s: config.form().period_s,
+                harmonics: config.form().harmonics,
                 periods: config.trajectory.periods,
                 approach_s: designed.and_then(|d| leg(&d.motion.file.approach)),
                 return_s: designed.and_then(|d| leg(&d.motion.file.back)),
-                sample_rate_hz: config.trajectory.sample_rate_hz,
+                sample_rate_hz: config.form().sample_rate_hz,
                 coefficients: designed.map_or_else(Vec::new, |d| d.coefficients.clone()),
             },
             condition_number: forecast.map(|f| f.condition),
@@ -314,6 +363,7 @@ impl DesignRun {
             }),
             starts: self.starts.iter().map(|s| start_record(s, set.criterion, columns)).collect(),
             infeasible: self.outcome.as_ref().err().map(infeasible_record),
+            followed: designed.and_then(|d| d.followed.clone()),
             noise: set.noise.clone(),
             provenance: provenance(config, self.inputs()),
         })
@@ -346,6 +396,15 @@ impl DesignRun {
                 way_out(fault.kind, &fault.subject).map_or_else(String::new, |line| format!("; {line}"))
             ));
         }
+        let excesses = match (&self.drives, &designed.followed) {
+            (Some(drives), Some(followed)) => drives.excesses(&self.set.problem.limits, followed),
+            _ => Vec::new(),
+        };
+        let leaves = !excesses.is_empty();
+        warnings.extend(excesses);
+        if let Some(followed) = &designed.followed {
+            warnings.extend(doubts(followed));
+        }
         let poorly: Vec<&str> = designed
             .forecast
             .columns
@@ -373,7 +432,8 @@ impl DesignRun {
             };
         }
         let near = self.near_best(designed);
-        let status = if designed.motion.leg_faults.is_empty() { Outcome::Pass } else { Outcome::Warn };
+        let sound = designed.motion.leg_faults.is_empty() && !leaves;
+        let status = if sound { Outcome::Pass } else { Outcome::Warn };
         let headline = format!(
             "all limits hold at every instant of the period: {}; not checked: {}; {near} of {} starts ended within {:.0} % of \
              the best",

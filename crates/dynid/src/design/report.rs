@@ -305,7 +305,13 @@ fn sentences(record: &DesignRecord) -> Vec<String> {
             random.mean_ratio
         ));
     }
-    if record.infeasible.is_none() {
+    if record.followed.is_some() {
+        out.push(
+            "The forecast is a simulation of the drives: it holds if they are as they are taken to be, and for errors of readings that are independent \
+             from sample to sample (or after the stated correlation time); friction of another law, elasticity and backlash come on top."
+                .to_owned(),
+        );
+    } else if record.infeasible.is_none() {
         out.push(
             "The forecast holds for noise that is independent from sample to sample (or after the stated correlation time) \
              and a model that fits; friction that the model does not hold, elasticity and delay come on top."
@@ -323,17 +329,34 @@ fn facts(config: &DesignConfig, record: &DesignRecord) -> Vec<Fact> {
         _ => "at speed",
     };
     let columns = match config.criterion.columns {
+        _ if config.has_drives() => "those of the drives",
         ColumnsName::All => "all base parameters",
         ColumnsName::Inertial => "base parameters of the rigid bodies",
     };
+    let (what, scale, unit) = match config.has_drives() {
+        true => ("noise of the positions, standard deviation", 1e3, "mrad, mm"),
+        false => ("noise of the effort, standard deviation", 1.0, "N m, N"),
+    };
     let noise: Vec<String> =
-        record.joints.iter().zip(&record.noise).map(|(j, s)| format!("{j} {s:.3}")).collect();
+        record.joints.iter().zip(&record.noise).map(|(j, s)| format!("{j} {:.3}", scale * s)).collect();
     let mut facts = vec![
         Fact::new("periods start and end", start, ""),
         Fact::new("parameters that count", columns, ""),
-        Fact::new("noise of the effort, standard deviation", noise.join(", "), "N m, N"),
+        Fact::new(what, noise.join(", "), unit),
         Fact::new("noise is independent after", config.criterion.correlation_time_s, "s"),
     ];
+    if let Some(followed) = &record.followed {
+        let each = |of: &dyn Fn(&super::FollowedJoint) -> String| {
+            followed.joints.iter().map(|j| format!("{} {}", j.joint, of(j))).collect::<Vec<_>>().join(", ")
+        };
+        facts.push(Fact::new(
+            "command less simulated reading, rms",
+            each(&|j| format!("{:.1}", 1e3 * j.behind_rms)),
+            "mrad, mm",
+        ));
+        facts.push(Fact::new("largest simulated speed", each(&|j| format!("{:.2}", j.speed)), "rad/s, m/s"));
+        facts.push(Fact::new("largest simulated effort", each(&|j| format!("{:.2}", j.effort)), "N m, N"));
+    }
     let pairs: Vec<String> = record.safety.pairs.iter().map(|[a, b]| format!("{a} and {b}")).collect();
     if !pairs.is_empty() {
         facts.push(Fact::new("links that are kept apart", pairs.join(", "), ""));

@@ -302,7 +302,31 @@ impl ServoConfig {
     /// # Errors
     /// [`Error::Setting`].
     pub fn check(&self) -> Result<(), Error> {
-        let s = &self.servo;
+        self.servo.check()?;
+        if let Some(gravity) = self.gravity.filter(|g| g.iter().any(|x| !x.is_finite())) {
+            return Err(Error::setting("gravity", "three finite numbers", format!("{gravity:?}")));
+        }
+        let parts = self.log.iter().chain(&self.validation).filter_map(|l| l.part);
+        for (a, b) in parts {
+            if !(0.0 <= a && a < b && b <= 1.0) {
+                let found = format!("[{a}, {b}]");
+                return Err(Error::setting("log.part", "two shares of the record, e.g. [0.0, 0.7]", found));
+            }
+        }
+        match self.lock.iter().find(|(_, x)| !x.is_finite()) {
+            Some((joint, x)) => Err(Error::setting(&format!("lock.{joint}"), "a finite number", x)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl DriveConfig {
+    /// Checks that every number makes sense.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let s = self;
         if !(0.0..1.0).contains(&s.gain_error) {
             return Err(Error::setting("servo.gain_error", "at least 0 and less than 1", s.gain_error));
         }
@@ -322,28 +346,15 @@ impl ServoConfig {
                 "none",
             ));
         }
-        if let Some(gravity) = self.gravity.filter(|g| g.iter().any(|x| !x.is_finite())) {
-            return Err(Error::setting("gravity", "three finite numbers", format!("{gravity:?}")));
-        }
-        let parts = self.log.iter().chain(&self.validation).filter_map(|l| l.part);
-        for (a, b) in parts {
-            if !(0.0 <= a && a < b && b <= 1.0) {
-                let found = format!("[{a}, {b}]");
-                return Err(Error::setting("log.part", "two shares of the record, e.g. [0.0, 0.7]", found));
-            }
-        }
-        match self.lock.iter().find(|(_, x)| !x.is_finite()) {
-            Some((joint, x)) => Err(Error::setting(&format!("lock.{joint}"), "a finite number", x)),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// What is known and asked of the joints of a robot.
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::UnknownJoint`].
-    pub(super) fn settings(&self, robot: &Robot, period: f64) -> Result<ServoSettings, Error> {
-        let s = &self.servo;
+    pub(crate) fn settings(&self, robot: &Robot, period: f64) -> Result<ServoSettings, Error> {
+        let s = self;
         let names = robot.rate_names();
         let mut out = ServoSettings::new(names.len());
         let gain = s.position_gain.positive("servo.position_gain", &names)?;

@@ -23,7 +23,7 @@ pub struct ServoFiles {
 }
 
 /// Friction and rotors that the robot file states.
-pub(super) fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
+pub(crate) fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
     let text = || dynid_io::input::read_text(&robot.path);
     let read = |source| Error::Read { file: robot.path.clone(), source };
     if robot.file.mjcf.is_some() {

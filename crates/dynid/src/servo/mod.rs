@@ -5,16 +5,23 @@
 
 pub mod config;
 mod files;
+mod found;
 mod logs;
 mod record;
 mod report;
 
 pub use config::ServoConfig;
 pub use files::ServoFiles;
+pub(crate) use files::stated;
+pub(crate) use found::{FoundDrives, set_terms};
+pub(crate) use record::member;
 pub use record::{
     AdditionRecord, DirectionRecord, HorizonRecord, ServoFile, ServoFit, ServoGroupKind, ServoGroupRecord,
     ServoLaw, ServoLogFit, ServoParameterRecord, ServoSimulation, ServoSpread, ServoVerdict,
 };
+
+use std::collections::BTreeMap;
+use std::path::Path;
 
 use dynid_servo::fit::{Evaluation, ServoProblem, blocks};
 use dynid_servo::identify::{LEAST_ROWS, ServoError, ServoIdentification, identify};
@@ -82,6 +89,14 @@ pub enum ServoFault {
         /// Robot file.
         robot: String,
     },
+    /// A file that no identification of drives wrote.
+    #[error("{file}: expected a result of `dynid servo`: {message}")]
+    File {
+        /// File.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
     /// The simulation.
     #[error(transparent)]
     Fit(#[from] ServoError),
@@ -100,6 +115,7 @@ impl Fault for ServoFault {
             ServoFault::Rows { .. } => "give commands and positions on the same rows, or `missing = \"drop\"`".to_owned(),
             ServoFault::NoPosition { .. } => "leave the log out, or lock the joint: `lock = { JOINT = 0.0 }`".to_owned(),
             ServoFault::NoJoint { .. } => "name the columns of positions: `[columns]` with `position`".to_owned(),
+            ServoFault::File { .. } => "give the `servo.json` of the output folder of `dynid servo`".to_owned(),
             ServoFault::Fit(ServoError::Lost(_)) => {
                 "check signs and units: state `direction`, `position_gain` and `velocity_gain` in `[servo]`".to_owned()
             }
@@ -146,7 +162,7 @@ pub fn identify_servo(
 ) -> Result<ServoResult, Error> {
     config.check()?;
     progress(ServoStep::Read(config.robot.display().to_string()));
-    let (mut robot, mut warnings) = clamped(config)?;
+    let (mut robot, mut warnings) = clamped(&config.robot, config.gravity, &config.lock)?;
     let mut inputs = InputRecord::of_robot(&robot);
     let mut read = |logs: &[config::ServoLogConfig], robot: &Robot| -> Result<Vec<logs::ReadLog>, Error> {
         logs.iter()
@@ -191,7 +207,7 @@ pub fn identify_servo(
         return Err(ServoFault::NoJoint { robot: config.robot.display().to_string() }.into());
     }
     let period = logs.iter().map(ServoLog::period).fold(0.0, f64::max);
-    let settings = config.settings(&robot, period)?;
+    let settings = config.servo.settings(&robot, period)?;
     progress(ServoStep::Fit);
     let found = identify(&robot.mechanism, &logs, &settings).map_err(ServoFault::from)?;
     let rms = |values: &ServoValues, logs: &[ServoLog]| -> Option<Vec<Vec<f64>>> {
@@ -221,15 +237,19 @@ fn over_logs(by_log: &[Vec<f64>], logs: &[ServoLog]) -> Vec<f64> {
     (0..by_log.first().map_or(0, Vec::len)).map(|j| (squares(j) / rows as f64).sqrt()).collect()
 }
 
-/// The robot with locked joints, its base clamped.
-fn clamped(config: &ServoConfig) -> Result<(Robot, Vec<String>), Error> {
+/// A robot with joints held at positions, its base clamped; warnings in words.
+pub(crate) fn clamped(
+    file: &Path,
+    gravity: Option<[f64; 3]>,
+    lock: &BTreeMap<String, f64>,
+) -> Result<(Robot, Vec<String>), Error> {
     let mut options = RobotOptions {
-        gravity: config.gravity,
+        gravity,
         couple_mimics: true,
         floating_base: false,
-        locked: config.lock.iter().map(|(name, x)| (name.clone(), *x)).collect(),
+        locked: lock.iter().map(|(name, x)| (name.clone(), *x)).collect(),
     };
-    let plain = Robot::load(&config.robot, &RobotOptions { locked: Vec::new(), ..options.clone() })?;
+    let plain = Robot::load(file, &RobotOptions { locked: Vec::new(), ..options.clone() })?;
     let floating: Vec<String> = plain
         .mechanism
         .bodies()
@@ -245,7 +265,7 @@ fn clamped(config: &ServoConfig) -> Result<(Robot, Vec<String>), Error> {
         ));
         options.locked.extend(floating.into_iter().map(|name| (name, 0.0)));
     }
-    let robot = if options.locked.is_empty() { plain } else { Robot::load(&config.robot, &options)? };
+    let robot = if options.locked.is_empty() { plain } else { Robot::load(file, &options)? };
     refuse_loops(&robot, "identified from commands and positions")?;
     refuse_elastic(&robot, "identified from commands and positions")?;
     // What the file says of bodies is what the scale of all efforts hangs on.

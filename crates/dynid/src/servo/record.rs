@@ -1,13 +1,18 @@
 //! `servo.json`.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use dynid_io::SourceFile;
 use dynid_record::{Outcome, words};
 use dynid_servo::fit::Ending;
 use dynid_servo::identify::{GroupKind, MISFIT, ServoGroup, ServoParameter, TOLD_DIRECTION};
-use dynid_servo::{Addition, Hold, LoadOf, Term};
+use dynid_servo::{Addition, Free, Hold, LoadOf, Term};
 use serde::{Deserialize, Serialize};
 
-use super::ServoResult;
-use super::config::ServoConfig;
+use super::config::{DriveConfig, ServoConfig};
+use super::{ServoFault, ServoResult};
+use crate::Error;
 use crate::estimate::{Provenance, SCHEMA};
 
 words! {
@@ -225,7 +230,46 @@ pub struct ServoSimulation {
     pub unsettled: (usize, usize),
 }
 
+/// What an identification of drives was told, of its settings.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Told {
+    /// What was known of the drives.
+    pub(crate) servo: DriveConfig,
+    /// Joints that were held.
+    pub(crate) lock: BTreeMap<String, f64>,
+    /// Gravity, if it was stated.
+    pub(crate) gravity: Option<[f64; 3]>,
+}
+
 impl ServoFile {
+    /// Reads a file that `dynid servo` wrote, with its digest.
+    ///
+    /// # Errors
+    /// [`Error::Read`]; [`ServoFault::File`] if it is none.
+    pub fn read(path: &Path) -> Result<(Self, SourceFile), Error> {
+        let bytes =
+            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let name = path.display().to_string();
+        let fault = |message: String| ServoFault::File { file: name.clone(), message };
+        let file: ServoFile = serde_json::from_slice(&bytes).map_err(|e| fault(e.to_string()))?;
+        if file.schema != SCHEMA {
+            return Err(fault(format!("expected schema {SCHEMA}, found {}", file.schema)).into());
+        }
+        Ok((file, SourceFile { sha256: dynid_io::digest::sha256(&bytes), path: name }))
+    }
+
+    /// What the identification was told; `file` names the file in errors.
+    ///
+    /// # Errors
+    /// [`ServoFault::File`].
+    pub(crate) fn told(&self, file: &str) -> Result<Told, Error> {
+        let fault = |e: serde_json::Error| ServoFault::File {
+            file: file.to_owned(),
+            message: format!("provenance.settings: {e}"),
+        };
+        Ok(Told::deserialize(&self.provenance.settings).map_err(fault)?)
+    }
+
     /// The file as text.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
@@ -248,6 +292,7 @@ impl ServoResult {
     pub fn file(&self, config: &ServoConfig, left_out: &[String]) -> ServoFile {
         let f = &self.found;
         let names = self.robot.rate_names();
+        let free: Vec<Free> = f.parameters.iter().map(|p| p.free.clone()).collect();
         let wrong = f.misfit.is_nan() || f.misfit > MISFIT;
         let parameters: Vec<ServoParameterRecord> =
             f.parameters.iter().map(|p| self.parameter(p, &names, wrong)).collect();
@@ -270,7 +315,7 @@ impl ServoResult {
             robot: self.robot.file.description.name.clone(),
             status,
             headline,
-            groups: f.groups.iter().map(|g| self.group(g, &names)).collect(),
+            groups: f.groups.iter().map(|g| ServoGroupRecord::of(g, &free, &names)).collect(),
             joints: names,
             parameters,
             law: ServoLaw {
@@ -373,42 +418,6 @@ impl ServoResult {
         }
     }
 
-    fn group(&self, group: &ServoGroup, names: &[String]) -> ServoGroupRecord {
-        let member = |k: &usize| {
-            let free = &self.found.parameters[*k].free;
-            let joints: Vec<&str> = free.joints().iter().map(|j| names[*j].as_str()).collect();
-            format!("{} {}", free.as_term().map_or("inertia", Term::name), joints.join(", "))
-        };
-        let (kind, remedy) = match group.kind {
-            GroupKind::Scale => (
-                ServoGroupKind::Scale,
-                "their ratios are known, their common scale is not: state `position_gain`, or log the same motion with a known mass \
-                 at the last link and move joints that lift it",
-            ),
-            GroupKind::Lag => (
-                ServoGroupKind::Lag,
-                "lags are alike below 5 Hz: move faster, with steps or chirps above 5 Hz",
-            ),
-            GroupKind::Posture => (
-                ServoGroupKind::Posture,
-                "record the joint in several postures, up to where gravity turns its sign",
-            ),
-            GroupKind::Friction => (
-                ServoGroupKind::Friction,
-                "record more speeds, from below 0.1 rad/s to the fastest, and loads of both signs",
-            ),
-            GroupKind::Other => (
-                ServoGroupKind::Other,
-                "move these joints apart from one another, at other speeds and postures",
-            ),
-        };
-        ServoGroupRecord {
-            kind,
-            members: group.members.iter().map(member).collect(),
-            remedy: remedy.to_owned(),
-        }
-    }
-
     fn verdict(&self, parameters: &[ServoParameterRecord]) -> (Outcome, String) {
         let f = &self.found;
         let mean = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
@@ -426,7 +435,7 @@ impl ServoResult {
         // Two steps of the encoder, or nothing that a number of the log would show.
         let still =
             self.motion().iter().zip(&f.floor).all(|(motion, floor)| *motion <= (2.0 * floor).max(1e-9));
-        if still || !parameters.iter().any(|p| usable(&p)) {
+        if still {
             return (
                 Outcome::Fail,
                 format!("no parameter is told by the logs, the joints hardly move: {size}"),
@@ -443,6 +452,9 @@ impl ServoResult {
                 "the simulation predicts no better than the command itself: {size}; check signs, units and gains"
             );
             return (Outcome::Fail, why);
+        }
+        if !parameters.iter().any(|p| usable(&p)) {
+            return (Outcome::Fail, format!("no parameter is told by the logs: {size}"));
         }
         if f.ending == Ending::Unfinished {
             return (Outcome::Fail, format!("the fit did not settle within its rounds: {size}"));
@@ -500,7 +512,7 @@ impl ServoResult {
                 untold.join(", ")
             ));
         }
-        if f.step_share > 0.2 {
+        if f.step_share > 0.1 {
             out.push(format!(
                 "half the step moves the simulation by {:.0} % of the residual: a smaller `step_s` would move the estimate",
                 100.0 * f.step_share
@@ -515,6 +527,46 @@ impl ServoResult {
             ));
         }
         out
+    }
+}
+
+/// Name of a parameter: its term and the joints that share it.
+pub(crate) fn member(free: &Free, names: &[String]) -> String {
+    let joints: Vec<&str> = free.joints().iter().map(|j| names[*j].as_str()).collect();
+    format!("{} {}", free.as_term().map_or("inertia", Term::name), joints.join(", "))
+}
+
+impl ServoGroupRecord {
+    /// A group of parameters of joints with these names.
+    pub(crate) fn of(group: &ServoGroup, free: &[Free], names: &[String]) -> ServoGroupRecord {
+        let (kind, remedy) = match group.kind {
+            GroupKind::Scale => (
+                ServoGroupKind::Scale,
+                "their ratios are known, their common scale is not: state `position_gain`, or log the same motion with a known mass \
+                 at the last link and move joints that lift it",
+            ),
+            GroupKind::Lag => (
+                ServoGroupKind::Lag,
+                "lags are alike below 5 Hz: move faster, with steps or chirps above 5 Hz",
+            ),
+            GroupKind::Posture => (
+                ServoGroupKind::Posture,
+                "record the joint in several postures, up to where gravity turns its sign",
+            ),
+            GroupKind::Friction => (
+                ServoGroupKind::Friction,
+                "record more speeds, from below 0.1 rad/s to the fastest, and loads of both signs",
+            ),
+            GroupKind::Other => (
+                ServoGroupKind::Other,
+                "move these joints apart from one another, at other speeds and postures",
+            ),
+        };
+        ServoGroupRecord {
+            kind,
+            members: group.members.iter().map(|k| member(&free[*k], names)).collect(),
+            remedy: remedy.to_owned(),
+        }
     }
 }
 

@@ -95,6 +95,7 @@ pub(super) fn experiment(
         joints,
         undriven: (0..model.outputs().len()).map(|output| model.is_undriven(output)).collect(),
         time: log.time,
+        command: None,
         position: log.position,
         velocity: settings.log_velocity.then_some(log.velocity),
         effort: log.effort,

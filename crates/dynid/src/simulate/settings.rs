@@ -45,6 +45,9 @@ pub struct SimulateSettings {
     /// coefficients (`dynid design` writes them) or a table of samples, `.csv` or `.csv.gz` (`dynid motion` writes them), whose
     /// channels such as `load_<joint>` are followed too. Relative to the settings' file.
     pub follow: Option<PathBuf>,
+    /// What `dynid servo` found of the drives, its `servo.json`: the trajectory is what they are told, and the log holds commands and positions and
+    /// no effort. `values` are then those of joints and terms (`j1.coulomb`, `j1.delay`). Relative to the settings' file.
+    pub drives: Option<PathBuf>,
     /// Only of robots with clearance on a periodic trajectory: time that is simulated before the log begins, s. Default 0.5.
     pub settle_s: Option<f64>,
     /// Only of robots with clearance: noise of the logged offsets of journals, m. Default 0.
@@ -211,6 +214,7 @@ impl Default for SimulateSettings {
             seed: 1,
             trajectory: BTreeMap::new(),
             follow: None,
+            drives: None,
             settle_s: None,
             journal_noise: 0.0,
             perfect: false,

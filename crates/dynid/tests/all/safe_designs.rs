@@ -25,7 +25,7 @@ fn robots() -> PathBuf {
 fn quick(robot: &Path) -> DesignConfig {
     let mut config = DesignConfig { robot: robot.to_owned(), ..DesignConfig::default() };
     config.search.starts = 1;
-    config.trajectory.sample_rate_hz = 50.0;
+    config.trajectory.sample_rate_hz = Some(50.0);
     config
 }
 
@@ -370,8 +370,8 @@ fn drives_of_a_parallel_machine_stay_away_from_singular_poses_and_limits_of_join
     let file = folder.path().join("prr3.toml");
     std::fs::write(&file, limited).unwrap();
     let mut config = quick(&file);
-    config.trajectory.period_s = 5.0;
-    config.trajectory.harmonics = 3;
+    config.trajectory.period_s = Some(5.0);
+    config.trajectory.harmonics = Some(3);
     config.limits.singularity = Some(0.4);
     config.safety.floor = false;
     config.keep = vec![KeepConfig {

@@ -316,3 +316,134 @@ fn recorded_legs_and_a_hobby_arm_are_predicted() {
         assert!(degrees < 0.6, "{}: {degrees}", log.name);
     }
 }
+
+/// What `dynid servo` leaves behind of a log of the arm, in its folder.
+fn first_log(folder: &TempDir) -> std::path::PathBuf {
+    let config =
+        config(folder, "robot = \"arm.urdf\"\n[[log]]\npath = \"a.csv\"\n[servo]\nvelocity_gain = 1.0\n");
+    let found = identify_servo(&config, &mut |_| {}).unwrap();
+    let path = folder.path().join("first.json");
+    std::fs::write(&path, found.file(&config, &[]).to_json()).unwrap();
+    path
+}
+
+/// True drives as settings of a virtual log take them.
+fn true_values() -> std::collections::BTreeMap<String, f64> {
+    let of = |(name, joint): (&str, ServoJoint)| -> Vec<(String, f64)> {
+        let known = |t: &Term| joint.get(*t).is_finite() && joint.get(*t) > 0.0;
+        Term::ALL.into_iter().filter(known).map(|t| (format!("{name}.{t}"), joint.get(t))).collect()
+    };
+    ["lift", "elbow"].into_iter().zip(truth()).flat_map(of).collect()
+}
+
+#[test]
+fn a_motion_designed_from_a_first_log_tells_more_and_what_it_promised() {
+    use dynid::design::{DesignConfig, design};
+    use dynid::simulate::{SimulateSettings, simulate_drives};
+
+    let folder = folder();
+    let drives = first_log(&folder);
+    let text = "robot = \"arm.urdf\"\ndrives = \"first.json\"\n[limits]\nacceleration = 30\n\
+        velocity = 5\n[safety]\nfloor = false\nself_collision = false\n[search]\nstarts = 2\n";
+    let path = folder.path().join("design.toml");
+    std::fs::write(&path, text).unwrap();
+    let config = DesignConfig::read(&path).unwrap();
+    let run = design(&config, &mut |_| {}).unwrap();
+    let record = run.record(&config).unwrap();
+    assert_eq!(record.joints, ["lift", "elbow"], "{:?}", record.verdict);
+    assert!(record.random.as_ref().unwrap().geometric_ratio > 1.2, "{:?}", record.random);
+    // The robot keeps what the command keeps.
+    for joint in &record.followed.as_ref().unwrap().joints {
+        assert!(
+            joint.position[0] >= -3.0 && joint.position[1] <= 3.0 && joint.speed < 1.05 * 5.0,
+            "{joint:?}"
+        );
+        assert!(joint.behind_rms > 0.05, "{joint:?}");
+    }
+    assert!(!record.verdict.warnings.iter().any(|w| w.contains("beyond")), "{:?}", record.verdict);
+
+    // Played by the true drives, read back by the same columns.
+    let motion = &run.outcome.as_ref().unwrap().motion;
+    let file = |name: &str| folder.path().join(name);
+    motion.file.write(file("trajectory.json")).unwrap();
+    run.write_commands(&file("commands.csv")).unwrap();
+    let settings = SimulateSettings {
+        drives: Some(drives.clone()),
+        follow: Some(file("trajectory.json")),
+        rate_hz: 100.0,
+        encoder_bits: 12,
+        values: true_values(),
+        ..SimulateSettings::default()
+    };
+    let made = simulate_drives(&file("arm.urdf"), &Default::default(), None, &settings).unwrap();
+    let told = made.command.as_ref().unwrap();
+    let commands = std::fs::read_to_string(file("commands.csv")).unwrap();
+    assert_eq!(commands.lines().next(), Some("t,cmd_lift,cmd_elbow"));
+    for (k, line) in commands.lines().skip(1).enumerate() {
+        let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        assert!((row[1] - told[0][k]).abs() < 1e-12 && (row[2] - told[1][k]).abs() < 1e-12, "{k}");
+    }
+    let mut log = String::from("t,cmd_lift,cmd_elbow,q_lift,q_elbow\n");
+    for (k, t) in made.time.iter().enumerate() {
+        let [a, b] = [0, 1].map(|j| made.position[j][k]);
+        writeln!(log, "{t},{},{},{a},{b}", told[0][k], told[1][k]).unwrap();
+    }
+    std::fs::write(file("played.csv"), log).unwrap();
+    let text = "robot = \"arm.urdf\"\n[[log]]\npath = \"played.csv\"\n[servo]\nvelocity_gain = 1.0\n";
+    let servo = self::config(&folder, text);
+    let found = identify_servo(&servo, &mut |_| {}).unwrap();
+    let (first, _) = dynid::servo::ServoFile::read(&drives).unwrap();
+    let played = found.file(&servo, &[]);
+    let (mut gained, mut kept, mut scaled) = (0.0, 0, Vec::new());
+    for p in &played.parameters {
+        let term = Term::named(&p.term).unwrap();
+        let joint = usize::from(p.joints[0] == "elbow");
+        let (low, high) = p.interval.unwrap();
+        kept += usize::from(low <= truth()[joint].get(term) && truth()[joint].get(term) <= high);
+        let name = format!("{} {}", p.term, p.joints.join(", "));
+        let forecast = record.parameters.iter().find(|f| f.name == name).unwrap();
+        // The forecast's noise is the residual of the first log, which is the rounding.
+        scaled.push(((p.value - truth()[joint].get(term)) / forecast.std).powi(2));
+        let before = first.parameters.iter().find(|f| f.term == p.term && f.joints == p.joints).unwrap();
+        gained += (before.model_std.unwrap() / p.model_std.unwrap()).ln();
+        assert!((forecast.std / p.model_std.unwrap()).ln().abs() < 0.5_f64, "{name} {forecast:?} {p:?}");
+    }
+    let n = played.parameters.len();
+    assert_eq!(n, 10);
+    assert!(kept >= n - 1, "{:?}", played.parameters);
+    let scaled = (scaled.iter().sum::<f64>() / n as f64).sqrt();
+    assert!(scaled < 2.5, "errors are {scaled} times the forecast");
+    // A first log of eight seconds with 1600 rows, beside 1001 rows.
+    assert!((gained / n as f64).exp() > 1.2, "{}", (gained / n as f64).exp());
+}
+
+#[test]
+fn designs_for_drives_say_what_they_need() {
+    use dynid::design::{DesignConfig, design};
+    let folder = folder();
+    first_log(&folder);
+    let fault = |text: &str| {
+        let path = folder.path().join("design.toml");
+        std::fs::write(&path, format!("robot = \"arm.urdf\"\nlocked = {{ finger = 0.0 }}\n{text}")).unwrap();
+        let run = DesignConfig::read(&path).and_then(|config| design(&config, &mut |_| {}).map(drop));
+        run.err().map_or_else(String::new, |e| e.to_string())
+    };
+    let cases = [
+        ("[servo]\nvelocity_gain = 1.0\n", "servo.position_gain"),
+        ("values = { \"lift.position_gain\" = 20.0 }\n[servo]\n", "none for `elbow`"),
+        ("values = { \"lift.gain\" = 20.0 }\n[servo]\nposition_gain = 25\n", "values"),
+        ("values = { \"lift.coulomb\" = -1.0 }\n[servo]\nposition_gain = 25\n", "at least 0"),
+        ("values = { \"lift.position_gain\" = 9.0 }\n[servo]\nposition_gain = 25\n", "no guess beside"),
+        ("drives = \"first.json\"\n[servo]\nposition_gain = 25\n", "both"),
+        ("drives = \"arm.urdf\"\n", "expected a result of `dynid servo`"),
+        ("drives = \"none.json\"\n", "none.json"),
+        ("[servo]\nposition_gain = 25\n[criterion]\ncolumns = \"inertial\"\n", "criterion.columns"),
+        ("[servo]\nposition_gain = 25\nfind_directions = true\n", "servo.find_directions"),
+        ("[servo]\nposition_gain = 25\n[elements]\ndefault = [\"viscous\"]\n", "elements"),
+        ("earlier = [\"a.json\"]\n[servo]\nposition_gain = 25\n", "earlier"),
+    ];
+    for (text, expected) in cases {
+        let found = fault(text);
+        assert!(found.contains(expected), "{text}: {found}");
+    }
+}

@@ -156,12 +156,12 @@ impl Lengths<'_> {
     }
 
     fn harmonics(&self) -> usize {
-        self.config.trajectory.harmonics
+        self.config.form().harmonics
     }
 
     /// The highest frequency that the configuration asks for.
     fn slowest_hz(&self) -> f64 {
-        self.harmonics() as f64 / self.config.trajectory.period_s
+        self.harmonics() as f64 / self.config.form().period_s
     }
 
     /// Highest frequencies of the motions that are tried.

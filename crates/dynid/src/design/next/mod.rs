@@ -92,6 +92,15 @@ pub fn next(
     if !(settings.longest_s > 0.0 && settings.longest_s.is_finite()) {
         return Err(Error::setting("longest", "a time above zero, s", settings.longest_s));
     }
+    if config.has_drives() {
+        let expected =
+            "none: factors are of logs with efforts; `dynid design` is for drives that log positions only";
+        return Err(Error::setting(
+            if config.drives.is_some() { "drives" } else { "servo" },
+            expected,
+            "one",
+        ));
+    }
     progress(DesignStep::Structure);
     let recipe = earlier.recipe();
     let solved = earlier.solve([], &mut |_| {})?;
@@ -139,8 +148,12 @@ pub fn next(
             let Found { design, period_s, harmonics, rows, cautions, .. } = found;
             let after = known.assess(&Factor::merge(&[known.information(), &rows]));
             lengths.pose(&mut set, period_s, harmonics);
-            run.config.trajectory =
-                TrajectoryConfig { period_s, harmonics, periods: 1, ..config.trajectory.clone() };
+            run.config.trajectory = TrajectoryConfig {
+                period_s: Some(period_s),
+                harmonics: Some(harmonics),
+                periods: 1,
+                ..config.trajectory.clone()
+            };
             for goal in run.goals.iter_mut().filter(|g| g.is_open()) {
                 if after[goal.parameter].posterior_std <= goal.deviation {
                     goal.state = WantedState::Reached;
@@ -157,7 +170,7 @@ pub fn next(
             Outcome::Found(design)
         }
     };
-    run.design = Some(finished(robot, set, &run.config, outcome, parking.as_deref(), progress)?);
+    run.design = Some(finished((robot, None), set, &run.config, outcome, parking.as_deref(), progress)?);
     Ok(run)
 }
 
@@ -166,7 +179,7 @@ fn subject(solved: Identification, known: &Knowledge) -> Subject {
     let values = solved.values().to_vec();
     let model = Arc::new(solved.model);
     let shape = model.parameters().shape_start();
-    let excitation = RobotExcitation::new(model.clone(), shape, &solved.base, Some(&values));
+    let excitation = Box::new(RobotExcitation::new(model.clone(), shape, &solved.base, Some(&values)));
     let noise = |row: &RowPrecision| match row.deviation {
         Some(deviation) if row.is_explained => deviation,
         // Rows that tell nothing weigh next to nothing.

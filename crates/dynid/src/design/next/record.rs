@@ -92,9 +92,8 @@ impl NextRun {
     /// [`Error`] of the figures that the record is made of.
     pub fn record(&self) -> Result<NextRecord, Error> {
         let design = self.design.as_ref().map(|run| run.record(&self.config)).transpose()?;
-        let trajectory = &self.config.trajectory;
         let moves = self.design.as_ref().is_some_and(|run| run.outcome.is_ok());
-        let recorded_s = moves.then_some(trajectory.period_s);
+        let recorded_s = moves.then_some(self.config.form().period_s);
         let verdict = self.verdict(design.as_ref(), recorded_s);
         let is_wanted = |j: &usize| self.goals.iter().any(|g| g.parameter == *j);
         let others =

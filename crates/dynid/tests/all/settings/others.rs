@@ -105,6 +105,7 @@ fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
         beside("fleet.faults", "[fleet]", "[fleet]\nfaults = 1", Changes),
         beside("fleet.broken", "[fleet]", "[fleet]\nbroken = 0.3", Changes),
         both("fleet.robots", [CLOSED, ""], [CLOSED, "[fleet]\nrobots = 3"], Refused("inverse dynamics")),
+        top("drives", "drives = \"none.json\"", Refused("simulate_drives")),
         top("follow", "follow = \"none.json\"", Refused("none.json")),
         top("follow", "follow = \"none.json\"\nshare = 0.3", Refused("follow")),
         top("settle_s", "settle_s = 0.2", Refused("clearance")),
@@ -260,6 +261,27 @@ fn without_clock(json: &serde_json::Value, out: &mut String) {
 fn every_key_of_a_design_takes_effect_or_is_refused() {
     let criterion = |text| table("criterion.name", text, Changes);
     let region = |key, text| table(key, text, Changes);
+    // Beside what gives the key something to act on.
+    let told = |key: &'static str, line: &'static str| {
+        let guesses = ["servo.gains", "servo.position_gain"].contains(&key);
+        let beside = match key {
+            "servo.gains" | "servo.position_gain" => "",
+            "servo.load" => "position_gain = 4000.0\nlaw = [\"load_friction\"]\n",
+            "servo.limited" => "position_gain = 4000.0\nvelocity_gain = 100.0\neffort_limit = 15.0\n",
+            _ => "position_gain = 4000.0\n",
+        };
+        let text = |more: &str, guesses: bool| Text {
+            top: if guesses {
+                "values = { \"j1.position_gain\" = 4000.0, \"j2.position_gain\" = 3000.0 }"
+            } else {
+                ""
+            },
+            tables: Box::leak(format!("[servo]\n{beside}{more}\n").into_boxed_str()),
+            ..Text::default()
+        };
+        let after = guesses && key != "servo.position_gain";
+        Case { key, before: text("", guesses), after: text(line, after), expect: Changes }
+    };
     let cases = vec![
         top("robot", "robot = \"longer.toml\"", Changes),
         top("gravity", "gravity = [0, -5, 0]", Changes),
@@ -406,6 +428,35 @@ half_space = { normal = [1, 0, 0], offset = 0.1 }",
             Changes,
         ),
         top("earlier", "earlier = [\"none.json\"]", Refused("none.json")),
+        top("drives", "drives = \"none.json\"", Refused("none.json")),
+        table("servo.position_gain", "[servo]\nvelocity_gain = 1.0", Refused("servo.position_gain")),
+        table("servo.position_gain", "[servo]\nposition_gain = 4000.0", Changes),
+        told("servo.position_gain", "position_gain = 5000.0"),
+        table(
+            "servo.gain_error",
+            "[servo]\nposition_gain = 4000.0\ngain_error = 0.2",
+            Refused("servo.gain_error"),
+        ),
+        told("servo.gains", "gains = \"own\""),
+        told("servo.velocity_gain", "velocity_gain = 300.0"),
+        told("servo.effort_limit", "effort_limit = 15.0"),
+        told("servo.limited", "limited = \"proportional\""),
+        told("servo.direction", "direction = { j2 = -1 }"),
+        table(
+            "servo.find_directions",
+            "[servo]\nposition_gain = 4000.0\nfind_directions = true",
+            Refused("servo.find_directions"),
+        ),
+        told("servo.zero", "zero = { j2 = 0.1 }"),
+        told("servo.zero_std", "zero_std = 0.001"),
+        told("servo.delay", "delay = 0.03"),
+        told("servo.delays", "delays = \"own\""),
+        told("servo.hold", "hold = \"line\""),
+        told("servo.law", "law = [\"stiction\"]"),
+        told("servo.find", "find = [\"smoothing_time\"]"),
+        told("servo.load", "load = \"bodies\""),
+        told("servo.step_s", "step_s = 0.001"),
+        table("servo.blocks", "[servo]\nposition_gain = 4000.0\nblocks = 30", Refused("servo.blocks")),
         table("search.starts", "[search]\nstarts = 2", Changes),
         table("search.seed", "[search]\nseed = 3", Changes),
         beside(

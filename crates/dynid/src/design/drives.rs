@@ -1,0 +1,645 @@
+//! Designs for robots whose drives are told positions and whose logs hold no effort.
+//!
+//! The trajectory is the command. The search takes the drives' loops for linear ([`ServoExcitation`]); the forecast simulates them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use dynid_excitation::criterion::{Criterion, Measure};
+use dynid_excitation::{
+    ColumnInfo, Design, Forecast, MotionLimits, Outcome, PositionLoop, Problem, ServoColumn, ServoExcitation,
+    Settings, StartOutcome, forecast_by,
+};
+use dynid_io::{ElementSpec, SourceFile};
+use dynid_linalg::Mat;
+use dynid_model::{Dynamics, EffortModel, RobotModel};
+use dynid_motion::trajectory::FourierBasis;
+use dynid_servo::forecast::{ServoForecast, forecast};
+use dynid_servo::{
+    Addition, Chain, Choice, Free, Scheme, ServoJoint, ServoLog, ServoSettings, ServoValues, Term,
+};
+
+use serde::Serialize;
+
+use super::config::{ColumnsName, CriterionName, DesignConfig};
+use super::limits::joint_limits;
+use super::problem::{self, RobotProblem, Subject};
+use crate::Error;
+use crate::config::ElementsConfig;
+use crate::elements::{DEFAULTS, ElementPlan};
+use crate::nominal::nominal_parameters;
+use crate::robot::Robot;
+use crate::servo::config::DriveConfig;
+use crate::servo::{FoundDrives, ServoFault, ServoGroupRecord, clamped, member, set_terms, stated};
+
+/// Counts a turn of an encoder about which nothing is said.
+const COUNTS: f64 = 4096.0;
+/// The same of a joint that slides, m.
+const SLIDE_STEP: f64 = 1e-4;
+/// Rotor inertia that nothing is said about, as a share of what the bodies have in the mean.
+const ROTOR_SHARE: f64 = 0.2;
+/// Poses over which inertias are averaged.
+const POSES: usize = 32;
+/// Peak of friction at rest, as a share of Coulomb friction, and Stribeck velocity, rad/s, about which nothing is said.
+const PEAK: f64 = 0.1;
+const STRIBECK: f64 = 0.1;
+
+/// The drives of a robot that a motion is designed for.
+pub(super) struct Drives {
+    values: ServoValues,
+    chains: Vec<Chain>,
+    free: Vec<Free>,
+    scheme: Scheme,
+    /// Standard deviation of the readings' noise by joint.
+    sigma: Vec<f64>,
+    /// Samples that count as one.
+    together: f64,
+    rate_hz: f64,
+    periods: usize,
+    slides: Vec<bool>,
+    joints: Vec<String>,
+    pub(super) source: Option<SourceFile>,
+    /// Doubts about the robot file and what was taken for granted, in words.
+    pub(super) warnings: Vec<String>,
+}
+
+/// The robot of a configuration with drives, its base clamped, joints without drives held.
+pub(super) fn load(config: &DesignConfig) -> Result<Option<(Robot, Drives)>, Error> {
+    refuse(config)?;
+    let period = 1.0 / config.form().sample_rate_hz;
+    match (&config.drives, &config.servo) {
+        (None, None) => Ok(None),
+        (Some(_), Some(_)) => {
+            Err(Error::setting("drives", "either a result of `dynid servo` or the table `[servo]`", "both"))
+        }
+        (Some(path), None) => {
+            let found = FoundDrives::read(path, &config.robot, &config.locked, config.gravity)?;
+            let settings = found.settings(period)?;
+            let warnings = found.warnings.clone();
+            let drives = Drives::new(&found.robot, config, settings, Some(&found), warnings)?;
+            Ok(Some((found.robot, drives)))
+        }
+        (None, Some(known)) => {
+            known.check()?;
+            let (robot, mut warnings) = clamped(&config.robot, config.gravity, &config.locked)?;
+            let mut settings = known.settings(&robot, period)?;
+            typical(&robot, config, &mut settings, &mut warnings)?;
+            let drives = Drives::new(&robot, config, settings, None, warnings)?;
+            Ok(Some((robot, drives)))
+        }
+    }
+}
+
+/// Refuses settings of designs for efforts.
+fn refuse(config: &DesignConfig) -> Result<(), Error> {
+    if !config.has_drives() {
+        return Ok(());
+    }
+    let elements = &config.elements;
+    let idle = [
+        (
+            "elements",
+            *elements != ElementsConfig::default(),
+            "none: `law` under [servo] says what drives have beside rotor inertia, viscous and Coulomb friction",
+        ),
+        (
+            "criterion.columns",
+            config.criterion.columns == ColumnsName::Inertial,
+            "`all`: the bodies are those of the robot file where no effort is measured",
+        ),
+        (
+            "earlier",
+            !config.earlier.is_empty(),
+            "none: earlier motions are not counted where no effort is measured",
+        ),
+        (
+            "servo.find_directions",
+            config.servo.as_ref().is_some_and(|s| s.find_directions),
+            "`direction` of every joint that is not 1: a motion goes where it is sent",
+        ),
+        (
+            "servo.gain_error",
+            config.servo.as_ref().is_some_and(|s| s.gain_error != DriveConfig::default().gain_error),
+            "no value: what wrong gains do is found on logs",
+        ),
+        (
+            "servo.blocks",
+            config.servo.as_ref().is_some_and(|s| s.blocks != DriveConfig::default().blocks),
+            "no value: a design has no blocks of logs",
+        ),
+    ];
+    match idle.iter().find(|(_, found, _)| *found) {
+        Some((key, _, expected)) => Err(Error::setting(key, expected, "one")),
+        None => Ok(()),
+    }
+}
+
+/// The effort model of the robot behind its drives: bodies, rotors, viscous and Coulomb friction, offsets.
+fn model(robot: &Robot) -> Result<(Arc<RobotModel>, ElementPlan), Error> {
+    let spec = ElementSpec { ties: Vec::new(), ..ElementSpec::default() };
+    let default = DEFAULTS.map(str::to_owned);
+    let plan = ElementPlan::new(&robot.mechanism, &spec, Some(&default), |_| true)?;
+    Ok((Arc::new(plan.tied_model(&robot.mechanism)?), plan))
+}
+
+/// Symbol of a term in the tables of effort models.
+fn symbol(term: Term) -> Option<&'static str> {
+    match term {
+        Term::Coulomb => Some("fc"),
+        Term::Viscous => Some("fv"),
+        Term::RotorInertia => Some("Ia"),
+        Term::Offset => Some("fo"),
+        _ => None,
+    }
+}
+
+impl Drives {
+    fn new(
+        robot: &Robot,
+        config: &DesignConfig,
+        mut settings: ServoSettings,
+        found: Option<&FoundDrives>,
+        mut warnings: Vec<String>,
+    ) -> Result<Self, Error> {
+        let rate_hz = config.form().sample_rate_hz;
+        let joints = robot.rate_names();
+        let slides: Vec<bool> = robot.mechanism.effort_units().iter().map(|u| *u == "N").collect();
+        let laws = laws(found, &settings);
+        for (name, known) in joints.iter().zip(&settings.known_gain) {
+            let key = format!("{name}.{}", Term::PositionGain);
+            if let Some(guess) = config.values.get(&key).filter(|_| *known) {
+                let expected = "no guess beside a gain that is known: `position_gain` of the drives";
+                return Err(Error::setting(&format!("values.{key}"), expected, guess));
+            }
+        }
+        set_terms(&joints, &config.values, &mut settings.joints)?;
+        complete(&joints, &laws, 1.0 / rate_hz, &mut settings)?;
+        // The robot tells its own.
+        warnings.retain(|w| !robot.warnings.contains(w));
+        let sigma = noise(config, found, &joints, &slides, &mut warnings)?;
+        let chains = Chain::all(&robot.mechanism);
+        Ok(Drives {
+            free: settings.free(&chains, &laws),
+            chains,
+            scheme: Scheme {
+                step_s: settings.step_s.unwrap_or(1.1 / rate_hz),
+                sign_width: 0.0,
+                middle: true,
+                load: settings.load,
+                hold: settings.hold,
+            },
+            values: ServoValues { joints: settings.joints, inertias: robot.mechanism.inertia_vector() },
+            sigma,
+            together: (config.criterion.correlation_time_s * rate_hz).max(1.0),
+            rate_hz,
+            periods: config.trajectory.periods,
+            slides,
+            joints,
+            source: found.map(|f| f.source.clone()),
+            warnings,
+        })
+    }
+
+    /// The problem of the search.
+    pub(super) fn problem(&self, robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
+        let (model, _) = model(robot)?;
+        let mut linear = model.parameters().prior();
+        for (joint, values) in self.joints.iter().zip(&self.values.joints) {
+            for term in [Term::Coulomb, Term::Viscous, Term::RotorInertia, Term::Offset] {
+                let name = symbol(term).map(|s| format!("{joint}.{s}"));
+                if let Some(column) = name.and_then(|n| model.parameters().column(&n)) {
+                    linear[column] = values.get(term);
+                }
+            }
+        }
+        let limits = joint_limits(robot, config, &self.joints, &mut Vec::new())?;
+        let inertia = mean_inertias(robot, &limits);
+        let of_joint = |(j, values): (usize, &ServoJoint)| PositionLoop {
+            position_gain: values.get(Term::PositionGain),
+            velocity_gain: values.get(Term::VelocityGain),
+            damping: values.get(Term::VelocityGain) + values.get(Term::Viscous),
+            inertia: inertia[j] + values.get(Term::RotorInertia),
+            delay: values.get(Term::Delay) + values.get(Term::SmoothingTime),
+        };
+        let loops = self.values.joints.iter().enumerate().map(of_joint).collect();
+        let kept: Vec<(usize, ServoColumn)> = (0..self.free.len())
+            .filter_map(|k| self.column(&self.free[k], &model).map(|column| (k, column)))
+            .collect();
+        let name = config.criterion.name.unwrap_or(CriterionName::RelativeStd);
+        let criterion = self.criterion(name, config, &kept)?;
+        let prior = self.prior(&kept);
+        let columns = kept.into_iter().map(|(k, column)| (column, self.info(k))).collect();
+        let period = config.form().period_s;
+        let excitation = ServoExcitation::new(model.clone(), linear.clone(), loops, period, columns);
+        let subject = Subject {
+            excitation: Box::new(excitation),
+            model,
+            nominal: Some(linear),
+            noise: Some(self.sigma.clone()),
+        };
+        let mut set = problem::problem_of(robot, config, subject, name, criterion)?;
+        set.problem.prior = prior;
+        set.assumptions.splice(0..0, self.warnings.iter().cloned());
+        Ok(set)
+    }
+
+    /// What stands for a parameter in the linear loops.
+    fn column(&self, free: &Free, model: &RobotModel) -> Option<ServoColumn> {
+        let (term, joints) = (free.as_term()?, free.joints());
+        match term {
+            Term::PositionGain => Some(ServoColumn::PositionGain(joints.to_vec())),
+            Term::Delay => Some(ServoColumn::Delay(joints.to_vec())),
+            Term::Zero => joints.first().map(|j| ServoColumn::Zero(*j)),
+            Term::Stiction | Term::StribeckVelocity => {
+                let joint = *joints.first()?;
+                let values = &self.values.joints[joint];
+                let (velocity, stiction) = (values.get(Term::StribeckVelocity), values.get(Term::Stiction));
+                Some(match term {
+                    Term::Stiction => ServoColumn::Stiction { joint, velocity },
+                    _ => ServoColumn::Stribeck { joint, velocity, stiction },
+                })
+            }
+            _ => {
+                let name = format!("{}.{}", self.joints[*joints.first()?], symbol(term)?);
+                model.parameters().column(&name).map(ServoColumn::Effort)
+            }
+        }
+    }
+
+    fn info(&self, k: usize) -> ColumnInfo {
+        let free = &self.free[k];
+        let slides = free.joints().first().is_some_and(|j| self.slides[*j]);
+        let term = free.as_term().unwrap_or(Term::Offset);
+        // Of what lies about zero no share can be told.
+        let nominal = Some(self.values.get(free)).filter(|_| counts(term));
+        ColumnInfo { name: member(free, &self.joints), unit: term.unit(slides).to_owned(), nominal }
+    }
+
+    fn criterion(
+        &self,
+        name: CriterionName,
+        config: &DesignConfig,
+        kept: &[(usize, ServoColumn)],
+    ) -> Result<Criterion, Error> {
+        if name != CriterionName::RelativeStd {
+            let columns: Vec<ColumnInfo> = kept.iter().map(|(k, _)| self.info(*k)).collect();
+            return problem::criterion(name, config, &columns);
+        }
+        let weight = |k: usize| {
+            let free = &self.free[k];
+            match free.as_term() {
+                Some(term) if counts(term) => self.values.get(free).abs().max(f64::MIN_POSITIVE).powi(-2),
+                _ => 0.0,
+            }
+        };
+        Ok(Criterion::raw(Measure::Trace(kept.iter().map(|(k, _)| weight(*k)).collect())))
+    }
+
+    /// Rows of what is known beforehand.
+    fn prior(&self, kept: &[(usize, ServoColumn)]) -> Option<Mat> {
+        let rows: Vec<(usize, f64)> = kept
+            .iter()
+            .enumerate()
+            .filter_map(|(c, (k, _))| self.free[*k].prior.map(|(_, std)| (c, 1.0 / std)))
+            .collect();
+        let mut out = Mat::zeros(rows.len(), kept.len());
+        for (row, (column, weight)) in rows.iter().enumerate() {
+            out[(row, *column)] = *weight;
+        }
+        (!rows.is_empty()).then_some(out)
+    }
+
+    /// The commands of a trajectory as a log without readings, in the encoders' numbers.
+    pub(super) fn commands(&self, problem: &Problem, coefficients: &[Vec<f64>]) -> ServoLog {
+        let rows = (self.periods as f64 * problem.period() * self.rate_hz + 1e-6).floor() as usize + 1;
+        let time: Vec<f64> = (0..rows).map(|k| k as f64 / self.rate_hz).collect();
+        let basis = FourierBasis::new(problem.base, problem.harmonics, time.clone());
+        let command: Vec<Vec<f64>> = coefficients
+            .iter()
+            .zip(&self.values.joints)
+            .map(|(x, joint)| {
+                let mut q = vec![0.0; rows];
+                basis.evaluate(0, x, &mut q);
+                q.iter_mut().for_each(|q| *q = joint.reading(*q));
+                q
+            })
+            .collect();
+        ServoLog::new("design", time, command.clone(), command)
+    }
+
+    /// What a log of the trajectory will tell by simulation, and where it leads the robot.
+    pub(super) fn forecast(
+        &self,
+        problem: &Problem,
+        coefficients: &[Vec<f64>],
+        samples: usize,
+    ) -> Result<(Option<Forecast>, FollowedRecord), Error> {
+        let commands = self.commands(problem, coefficients);
+        let simulated = self.simulate(&commands)?;
+        let seen = simulated.seen.clone();
+        let columns: Vec<ColumnInfo> = seen.iter().map(|k| self.info(*k)).collect();
+        let triangle_of = |other: &[Vec<f64>]| {
+            let other = self.simulate(&self.commands(problem, other)).ok()?;
+            (other.seen == seen).then_some(other.triangle)
+        };
+        let found = forecast_by(problem, coefficients, samples, &columns, &triangle_of);
+        let joints = (0..self.joints.len()).map(|j| self.followed(j, &commands, &simulated)).collect();
+        let unseen = (0..self.free.len()).filter(|k| !seen.contains(k));
+        let record = FollowedRecord {
+            joints,
+            groups: simulated
+                .groups
+                .iter()
+                .map(|g| ServoGroupRecord::of(g, &self.free, &self.joints))
+                .collect(),
+            unseen: unseen.map(|k| member(&self.free[k], &self.joints)).collect(),
+        };
+        Ok((found, record))
+    }
+
+    /// What the drives are told at positions of all joints, coordinate after coordinate, by joint.
+    pub(super) fn told(&self, q: &[f64]) -> Vec<Vec<f64>> {
+        let samples = q.len() / self.joints.len().max(1);
+        let by_joint = q.chunks_exact(samples.max(1)).zip(&self.values.joints);
+        by_joint.map(|(q, joint)| q.iter().map(|q| joint.reading(*q)).collect()).collect()
+    }
+
+    fn followed(&self, j: usize, commands: &ServoLog, simulated: &ServoForecast) -> FollowedJoint {
+        let (joint, reading) = (&self.values.joints[j], &simulated.reading[j]);
+        let rows = reading.len() as f64;
+        let squares: f64 = commands.command[j].iter().zip(reading).map(|(u, x)| (u - x) * (u - x)).sum();
+        let positions: Vec<f64> = reading.iter().map(|x| joint.position(*x)).collect();
+        let largest = |of: &[f64]| of.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        FollowedJoint {
+            joint: self.joints[j].clone(),
+            behind_rms: (squares / rows).sqrt(),
+            position: [
+                positions.iter().copied().fold(f64::INFINITY, f64::min),
+                positions.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            ],
+            speed: largest(&simulated.velocity[j]),
+            effort: largest(&simulated.effort[j]),
+            at_limit: {
+                let limit = joint.get(Term::EffortLimit) * (1.0 - 1e-9);
+                simulated.effort[j].iter().filter(|e| e.abs() >= limit).count() as f64 / rows
+            },
+            direction: joint.direction,
+            zero: joint.get(Term::Zero),
+        }
+    }
+
+    fn simulate(&self, commands: &ServoLog) -> Result<ServoForecast, Error> {
+        let sigma: Vec<f64> = self.sigma.iter().map(|s| s * self.together.sqrt()).collect();
+        forecast(&self.chains, commands, &self.values, &self.free, self.scheme, &sigma)
+            .map_err(|lost| ServoFault::Fit(lost.into()).into())
+    }
+
+    /// Moves a design until the simulated robot keeps the limits too, as far as that goes.
+    ///
+    /// The linear loops of the search keep them; friction, coupling and inertia that changes with the pose take the robot a little beyond. Ranges and
+    /// speeds are made smaller by that much, and the search goes on from where it was.
+    pub(super) fn within(
+        &self,
+        problem: &mut Problem,
+        settings: &Settings,
+        mut found: Design,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Design, Error> {
+        let stated = problem.limits.clone();
+        for round in 1..=ROUNDS {
+            let simulated = self.simulate(&self.commands(problem, &found.coefficients))?;
+            let mut beyond = false;
+            for (j, (limit, stated)) in problem.limits.iter_mut().zip(&stated).enumerate() {
+                let joint = &self.values.joints[j];
+                let positions = || simulated.reading[j].iter().map(|x| joint.position(*x));
+                let low = positions().fold(f64::INFINITY, f64::min);
+                let high = positions().fold(f64::NEG_INFINITY, f64::max);
+                let speed = simulated.velocity[j].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                let room = ROOM * stated.half_range();
+                if low < stated.position.0 {
+                    (beyond, limit.position.0) = (true, limit.position.0 + stated.position.0 - low + room);
+                }
+                if high > stated.position.1 {
+                    (beyond, limit.position.1) = (true, limit.position.1 - (high - stated.position.1) - room);
+                }
+                if speed > (1.0 + SPEED_EXCESS) * stated.velocity {
+                    (beyond, limit.velocity) = (true, limit.velocity * stated.velocity / speed);
+                }
+            }
+            if !beyond || problem.limits.iter().any(|l| l.position.0 >= l.position.1) {
+                break;
+            }
+            progress(round);
+            let seed = found.best().seed;
+            let once =
+                Settings { starts: 1, seed, from: Some(found.coefficients.clone()), ..settings.clone() };
+            let again = dynid_excitation::design(problem, &once, Vec::new(), &mut |_| {});
+            let Ok(Outcome::Found(again)) = again else { break };
+            found.coefficients.clone_from(&again.coefficients);
+            let evaluations = found.best().evaluations + again.best().evaluations;
+            found.starts[found.best] = StartOutcome { evaluations, ..again.best().clone() };
+        }
+        problem.limits = stated;
+        Ok(found)
+    }
+
+    /// What the simulated robot does beyond the limits of what it was told, in words.
+    pub(super) fn excesses(&self, limits: &[MotionLimits], followed: &FollowedRecord) -> Vec<String> {
+        let mut out = Vec::new();
+        for ((limit, joint), slides) in limits.iter().zip(&followed.joints).zip(&self.slides) {
+            let unit = if *slides { "m" } else { "rad" };
+            let [low, high] = joint.position;
+            let beyond = (limit.position.0 - low).max(high - limit.position.1);
+            if beyond > POSITION_EXCESS * limit.half_range() {
+                out.push(format!(
+                    "the simulated joint `{}` goes {beyond:.3} {unit} beyond its position limit: lower `share`, or `acceleration`",
+                    joint.joint
+                ));
+            }
+            if joint.speed > (1.0 + SPEED_EXCESS) * limit.velocity {
+                out.push(format!(
+                    "the simulated joint `{}` reaches {:.2} {unit}/s where {:.2} is the limit: lower `share`, or `velocity`",
+                    joint.joint, joint.speed, limit.velocity
+                ));
+            }
+        }
+        out
+    }
+}
+
+/// Searches that go on within smaller limits, at most.
+const ROUNDS: usize = 6;
+/// Room that they leave, as a part of the half range.
+const ROOM: f64 = 0.005;
+/// Parts of the half range, and of the limit, by which a simulated joint may leave what its command keeps.
+const POSITION_EXCESS: f64 = 0.01;
+const SPEED_EXCESS: f64 = 0.05;
+
+/// Where commands lead a robot, by simulation of its drives.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct FollowedRecord {
+    /// Joints.
+    pub joints: Vec<FollowedJoint>,
+    /// Parameters that will be known together only.
+    pub groups: Vec<ServoGroupRecord>,
+    /// Parameters that no reading depends on.
+    pub unseen: Vec<String>,
+}
+
+/// Where commands lead a joint. Units are rad or m, s, N m or N.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct FollowedJoint {
+    /// Joint.
+    pub joint: String,
+    /// RMS of the command less the reading.
+    pub behind_rms: f64,
+    /// Least and largest position.
+    pub position: [f64; 2],
+    /// Largest speed.
+    pub speed: f64,
+    /// Largest effort of the drive.
+    pub effort: f64,
+    /// Share of the samples at which the effort is at the drive's limit.
+    pub at_limit: f64,
+    /// Direction of command and encoder against the joint, 1 or -1.
+    pub direction: f64,
+    /// Position of the joint where its encoder reads zero: the drive is told `direction (q - zero)`.
+    pub zero: f64,
+}
+
+/// Whether a parameter is what a design is for, beside what is only there to be told apart from it.
+fn counts(term: Term) -> bool {
+    !matches!(term, Term::Offset | Term::Zero)
+}
+
+/// What the law of the drives will have beside rotor inertia, viscous and Coulomb friction: what is stated or was found, else offsets and zeros,
+/// which held-out data ask for most often.
+fn laws(found: Option<&FoundDrives>, settings: &ServoSettings) -> BTreeSet<Addition> {
+    let mut out: BTreeSet<Addition> = match (&settings.choice, found) {
+        (Choice::Given(given), _) => given.iter().copied().collect(),
+        (Choice::HeldOut, Some(found)) => {
+            let taken = |a: &Addition| found.file.law.additions.iter().any(|name| name == a.name());
+            Addition::ALL.into_iter().filter(taken).collect()
+        }
+        (Choice::HeldOut, None) => BTreeSet::from([Addition::Offset, Addition::Zero]),
+    };
+    if settings.own_gains {
+        out.insert(Addition::OwnGains);
+    }
+    out
+}
+
+/// Sets friction and rotor inertia that nothing is known of: what the robot file states, else what is typical.
+fn typical(
+    robot: &Robot,
+    config: &DesignConfig,
+    settings: &mut ServoSettings,
+    warnings: &mut Vec<String>,
+) -> Result<(), Error> {
+    let names = robot.rate_names();
+    let (model, plan) = model(robot)?;
+    let guess = nominal_parameters(&model, &plan, &BTreeMap::new())?;
+    let stated = stated(robot)?;
+    let given = |name: &str, term: Term| config.values.contains_key(&format!("{name}.{term}"));
+    let mut guessed = Vec::new();
+    for (j, (name, joint)) in names.iter().zip(&mut settings.joints).enumerate() {
+        for term in [Term::Coulomb, Term::Viscous] {
+            let column = symbol(term).and_then(|s| model.parameters().column(&format!("{name}.{s}")));
+            column.into_iter().for_each(|c| joint.set(term, guess[c]));
+        }
+        if let Some(of) = stated.iter().find(|s| s.joint == *name) {
+            let found = [
+                (Term::Viscous, of.damping),
+                (Term::Coulomb, of.friction_loss),
+                (Term::RotorInertia, of.armature),
+            ];
+            found.into_iter().filter(|(_, x)| *x > 0.0).for_each(|(term, x)| joint.set(term, x));
+        }
+        if joint.get(Term::RotorInertia) <= 0.0 && !given(name, Term::RotorInertia) {
+            guessed.push(j);
+        }
+    }
+    if !guessed.is_empty() {
+        let inertia = mean_inertias(robot, &joint_limits(robot, config, &names, &mut Vec::new())?);
+        guessed.iter().for_each(|j| settings.joints[*j].set(Term::RotorInertia, ROTOR_SHARE * inertia[*j]));
+        let names: Vec<&str> = guessed.into_iter().map(|j| names[j].as_str()).collect();
+        warnings.push(format!(
+            "no rotor inertia is stated for {}: {ROTOR_SHARE} of the mean inertia of the bodies is taken",
+            names.join(", ")
+        ));
+    }
+    Ok(())
+}
+
+/// Sets what a slope needs to be told from none: a delay, a peak of friction at rest. Refuses joints without a gain.
+fn complete(
+    names: &[String],
+    laws: &BTreeSet<Addition>,
+    period: f64,
+    settings: &mut ServoSettings,
+) -> Result<(), Error> {
+    for (name, joint) in names.iter().zip(&mut settings.joints) {
+        if joint.get(Term::PositionGain) <= 0.0 {
+            let expected = format!(
+                "a gain of every joint: here if it is known, as `\"{name}.position_gain\" = ...` under [values] if it is a guess, or \
+                 `drives = \"servo.json\"` of a first log"
+            );
+            return Err(Error::setting("servo.position_gain", &expected, format!("none for `{name}`")));
+        }
+        if joint.get(Term::Delay) <= 0.0 && !settings.known_delay {
+            joint.set(Term::Delay, period);
+        }
+        if laws.contains(&Addition::Stiction) && joint.get(Term::Stiction) <= 0.0 {
+            joint.set(Term::Stiction, PEAK * joint.get(Term::Coulomb));
+            joint.set(Term::StribeckVelocity, STRIBECK);
+        }
+    }
+    Ok(())
+}
+
+/// Standard deviation of the readings' noise by joint.
+fn noise(
+    config: &DesignConfig,
+    found: Option<&FoundDrives>,
+    joints: &[String],
+    slides: &[bool],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<f64>, Error> {
+    let given = config.criterion.noise.positive("criterion.noise", joints)?;
+    let rounding = |j: usize| {
+        let step = if slides[j] { SLIDE_STEP } else { std::f64::consts::TAU / COUNTS };
+        step / 12.0_f64.sqrt()
+    };
+    let residual = |j: usize| found.and_then(|f| f.file.fit.rms.get(j)).filter(|x| **x > 0.0);
+    let guessed: Vec<&str> = (0..joints.len())
+        .filter(|j| given[*j].is_none() && residual(*j).is_none())
+        .map(|j| joints[j].as_str())
+        .collect();
+    if !guessed.is_empty() {
+        warnings.push(format!(
+            "noise of the positions is not stated for {}: the rounding of encoders with 4096 counts a turn is taken (0.1 mm of joints that slide)",
+            guessed.join(", ")
+        ));
+    }
+    let of = |j: usize| given[j].or(residual(j).copied()).unwrap_or_else(|| rounding(j));
+    Ok((0..joints.len()).map(of).collect())
+}
+
+/// Inertia of the bodies that every joint moves alone, mean over poses within the limits.
+fn mean_inertias(robot: &Robot, limits: &[MotionLimits]) -> Vec<f64> {
+    let dynamics = Dynamics::new(&robot.mechanism);
+    let inertias = robot.mechanism.inertia_vector();
+    let (n, mut work) = (limits.len(), dynamics.workspace());
+    let mut mean = vec![0.0; n];
+    for pose in 0..POSES {
+        // Multiples of square roots spread evenly.
+        let at = |(j, limit): (usize, &MotionLimits)| {
+            let share = ((pose as f64 + 0.5) * (2.0 + j as f64).sqrt()).fract();
+            limit.position.0 + share * (limit.position.1 - limit.position.0)
+        };
+        let q: Vec<f64> = limits.iter().enumerate().map(at).collect();
+        let mass = dynamics.mass_matrix(&q, &inertias, &mut work);
+        mean.iter_mut().enumerate().for_each(|(j, m)| *m += mass[j * n + j] / POSES as f64);
+    }
+    mean
+}
