@@ -111,7 +111,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         return Err(Error::setting("fleet", "no table beside a single log", "[fleet]"));
     }
     if let Some(drives) = &settings.drives {
-        let expected = "no file: `simulate_drives` is for drives that are told positions";
+        let expected = "no file beside a robot in memory: `dynid simulate --drives` makes logs of drives that are told positions";
         return Err(Error::setting("drives", expected, drives.display()));
     }
     let mechanism = &robot.mechanism;

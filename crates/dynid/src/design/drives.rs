@@ -285,12 +285,19 @@ impl Drives {
             let columns: Vec<ColumnInfo> = kept.iter().map(|(k, _)| self.info(*k)).collect();
             return problem::criterion(name, config, &columns);
         }
-        let weight = |k: usize| {
-            let free = &self.free[k];
-            match free.as_term() {
-                Some(term) if counts(term) => self.values.get(free).abs().max(f64::MIN_POSITIVE).powi(-2),
-                _ => 0.0,
-            }
+        let size = |term: Term, free: &Free| {
+            let alike =
+                self.free.iter().filter(|f| f.as_term() == Some(term)).map(|f| self.values.get(f).abs());
+            // Of what stands at a bound at zero no share can be asked for.
+            let floor = problem::FLOOR_SHARE * alike.fold(0.0, f64::max);
+            self.values.get(free).abs().max(floor)
+        };
+        let weight = |k: usize| match self.free[k].as_term().filter(|term| counts(*term)) {
+            Some(term) => match size(term, &self.free[k]) {
+                0.0 => 1.0,
+                x => 1.0 / (x * x),
+            },
+            None => 0.0,
         };
         Ok(Criterion::raw(Measure::Trace(kept.iter().map(|(k, _)| weight(*k)).collect())))
     }

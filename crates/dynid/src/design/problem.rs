@@ -26,7 +26,7 @@ use crate::settings::known;
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
 /// is next to nothing are not worth motion.
-const FLOOR_SHARE: f64 = 0.05;
+pub(super) const FLOOR_SHARE: f64 = 0.05;
 /// Noise of an effort that nothing is said about, as a share of its limit or of the largest nominal effort.
 const NOISE_SHARE: f64 = 0.01;
 

@@ -105,7 +105,7 @@ fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
         beside("fleet.faults", "[fleet]", "[fleet]\nfaults = 1", Changes),
         beside("fleet.broken", "[fleet]", "[fleet]\nbroken = 0.3", Changes),
         both("fleet.robots", [CLOSED, ""], [CLOSED, "[fleet]\nrobots = 3"], Refused("inverse dynamics")),
-        top("drives", "drives = \"none.json\"", Refused("simulate_drives")),
+        top("drives", "drives = \"none.json\"", Refused("simulate --drives")),
         top("follow", "follow = \"none.json\"", Refused("none.json")),
         top("follow", "follow = \"none.json\"\nshare = 0.3", Refused("follow")),
         top("settle_s", "settle_s = 0.2", Refused("clearance")),
