@@ -56,7 +56,7 @@ impl PeriodicResponse {
         spectrum.iter_mut().zip(&self.response).for_each(|(x, g)| *x *= g);
         let last = spectrum.len() - 1;
         spectrum[0].im = 0.0;
-        if signal.len() % 2 == 0 {
+        if signal.len().is_multiple_of(2) {
             spectrum[last].im = 0.0;
         }
         let transformed = self.back.process(&mut spectrum, signal);
