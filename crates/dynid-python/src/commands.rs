@@ -8,6 +8,7 @@ use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
 use dynid::pipeline::held_where_not_logged;
 use dynid::preflight;
+use dynid::servo::{ServoConfig, ServoStep, identify_servo};
 use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -36,6 +37,30 @@ pub(crate) fn check(
         preflight::of_logs(&settings, &held, &logs, &Overlaps::of(&logs, &[]))
     })?;
     as_json(&findings)
+}
+
+/// Identifies drives from commands and positions: the record as JSON, the page, and the files that other programs take, name and text.
+#[pyfunction]
+#[pyo3(signature = (config, *, progress=None, threads=0))]
+pub(crate) fn servo(
+    py: Python<'_>,
+    config: &str,
+    progress: Option<Bound<'_, PyAny>>,
+    threads: usize,
+) -> PyResult<(String, String, Vec<(String, String)>)> {
+    let config: ServoConfig = parsed(py, config, "settings of drives")?;
+    work::run(py, progress, threads, move |tell| {
+        let found = identify_servo(&config, &mut |step| {
+            tell(match step {
+                ServoStep::Read(file) => format!("reading {file}"),
+                ServoStep::Fit => "simulating drives".to_owned(),
+            });
+        })?;
+        let files = found.files()?;
+        let file = found.file(&config, &files.notes);
+        let page = found.report(&file)?;
+        Ok((file.to_json(), page, files.files))
+    })
 }
 
 /// Designs a motion: a dictionary with its samples, the coefficients and the record as JSON.
@@ -68,6 +93,10 @@ pub(crate) fn design<'py>(
             let flat: Vec<f64> =
                 (0..rows).flat_map(|s| (0..columns).map(move |c| values[c * rows + s])).collect();
             out.set_item(name, vector(py, &flat).reshape([rows, columns])?)?;
+        }
+        if let Some(told) = run.commands().map_err(|e| raise(py, &e))? {
+            let flat: Vec<f64> = (0..rows).flat_map(|s| told.iter().map(move |u| u[s])).collect();
+            out.set_item("commands", vector(py, &flat).reshape([rows, told.len()])?)?;
         }
     }
     Ok(out)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import dynid
 import numpy as np
 import pytest
 
@@ -120,3 +122,100 @@ def test_drives_of_a_mujoco_arm_are_found_and_put_back(tmp_path: Path, seed: int
     # And by MuJoCo's own parser the file that is included.
     (tmp_path / "out/whole.xml").write_text(edited.replace("</mujoco>", '<include file="actuators.xml"/></mujoco>'))
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "out/whole.xml")).nu == 2
+
+
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.15 0 0"/><mass value="1.2"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <link name="fore"><inertial><origin xyz="0.12 0 0"/><mass value="0.8"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.005" iyz="0" izz="0.005"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="60" velocity="6"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="60" velocity="6"/></joint>
+</robot>
+"""
+
+
+def moved(mujoco: Any, command: np.ndarray[Any, Any], period: float) -> np.ndarray[Any, Any]:
+    """What encoders read of the true arm in MuJoCo, by Runge-Kutta steps and dry friction that hardly gives way."""
+    text = arm({joint: values[2:] for joint, values in TRUTH.items()})
+    text = text.replace('timestep="0.0005" integrator="implicitfast"', 'timestep="0.0001" integrator="RK4"')
+    text = text.replace('solreffriction="0.001 1"', 'solreffriction="0.0004 1" solimpfriction="0.9999 0.9999 0.001"')
+    drives = "".join(
+        f'<general joint="{joint}" biastype="affine" gainprm="{kp}" biasprm="0 -{kp} -{kv}"/>' for joint, (kp, kv, *_) in TRUTH.items()
+    )
+    model = mujoco.MjModel.from_xml_string(text.replace("</mujoco>", f"<actuator>{drives}</actuator></mujoco>"))
+    data = mujoco.MjData(model)
+    data.qpos[:] = command[0]
+    mujoco.mj_forward(model, data)
+    ticks, late = round(period / 1e-4), round(DELAY / 1e-4)
+    rows = []
+    for k in range(len(command) * ticks):
+        if k % ticks == 0:
+            rows.append(np.round(data.qpos / STEP) * STEP)
+        data.ctrl[:] = command[max(0, k - late) // ticks]
+        mujoco.mj_step(model, data)
+    return np.array(rows)
+
+
+def test_arrays_give_drives_and_drives_the_next_motion(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    robot = dynid.Robot.parse(ARM, "arm.urdf")
+    command = commands(1600, 3)
+    t = np.arange(1600) * PERIOD
+    log = dynid.CommandLog(t, command, moved(mujoco, command, PERIOD), name="first log")
+    steps: list[str] = []
+    gains: dict[str, Any] = {"velocity_gain": {joint: values[1] for joint, values in TRUTH.items()}, "gains": "own"}
+    first = dynid.servo(robot, log, progress=steps.append, **gains)
+    assert first.status in ("pass", "warn") and steps, first
+    assert first.joints == ["shoulder", "elbow"] and first.record["fit"]["by_log"][0]["log"] == "first_log.npz"
+    place = {"position_gain": 0, "rotor_inertia": 2, "viscous": 3, "coulomb": 4}
+
+    def errors(found: dynid.Servo) -> dict[tuple[str, str], float]:
+        out = {}
+        for p in found.parameters.rows():
+            true = DELAY if p["term"] == "delay" else TRUTH[p["joints"].split(", ")[0]][place[p["term"]]]
+            out[p["term"], p["joints"]] = abs(p["value"] / true - 1)
+        return out
+
+    assert max(errors(first).values()) < 0.05, errors(first)
+
+    # The same by files and the command line: the same bytes but for names of files.
+    rows = np.column_stack([t, command, log.signals["q"]])
+    head = "t,cmd_shoulder,cmd_elbow,q_shoulder,q_elbow"
+    np.savetxt(tmp_path / "first.csv", rows, delimiter=",", header=head, comments="", fmt="%.17g")
+    of_file = dynid.servo(robot, tmp_path / "first.csv", **gains)
+    assert of_file.record["parameters"] == first.record["parameters"]
+    backwards = dynid.CommandLog(t, command[:, ::-1], log.signals["q"][:, ::-1], joints=["elbow", "shoulder"])
+    assert dynid.servo(robot, backwards, **gains).record["parameters"] == first.record["parameters"]
+
+    again = pickle.loads(pickle.dumps(first))
+    assert again.to_json() == first.to_json() and "</html>" in again.report()
+    first.save(tmp_path / "out")
+    assert {"servo.json", "report.html", "robot.urdf", "actuators.json"} <= {p.name for p in (tmp_path / "out").iterdir()}
+
+    wanted: dict[str, Any] = {
+        "limits": {"velocity": 4, "acceleration": 30},
+        "safety": {"floor": False, "self_collision": False},
+        "search": {"starts": 2},
+    }
+    made = dynid.design(robot, drives=first, **wanted)
+    assert made.feasible and made.commands is not None, made
+    assert made.commands.shape == (1001, 2) and np.abs(made.commands).max() <= 2
+    by_file = dynid.design(robot, drives=str(tmp_path / "out/servo.json"), **wanted)
+    assert by_file.commands is not None and np.array_equal(made.commands, by_file.commands)
+    reading = moved(mujoco, made.commands, 0.01)
+    assert np.abs(reading).max() < 2.05
+    second = dynid.servo(robot, dynid.CommandLog(made.t, made.commands, reading), validation=log, **gains)
+    found = errors(second)
+    assert np.exp(np.mean(np.log([max(x, 1e-5) for x in found.values()]))) < 0.005, found
+    assert second.record["validation"][0]["rms"][0] < 1e-3
+
+    with pytest.raises(dynid.SettingError):
+        dynid.servo(robot, log, position_gan=3)
+    with pytest.raises(ValueError, match="shape"):
+        dynid.CommandLog(t, command, command[:-1])
+    with pytest.raises(ValueError, match="wrist"):
+        dynid.servo(robot, dynid.CommandLog(t, command, command, joints=["shoulder", "wrist"]))

@@ -34,7 +34,7 @@ def test_page_of_the_book(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         return re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
     names: dict[str, Any] = {}
-    assert len(blocks("docs/book/src/python.md")) == 5
+    assert len(blocks("docs/book/src/python.md")) == 6
     exec("\n".join(blocks("docs/book/src/python.md")), names)  # noqa: S102
     assert {"estimate.json", "report.html", "robot.urdf"} <= {p.name for p in tmp_path.iterdir()}
     record = names["record"]

@@ -242,14 +242,23 @@ fn report_samples(config: &DesignConfig) -> usize {
 }
 
 impl DesignRun {
-    /// Writes what the drives are told, approach and return included; without drives, or a trajectory, nothing.
+    /// What the drives are told at the samples of the motion, approach and return included, in the numbers of their encoders: joint after joint.
+    /// `None` without drives, or without a trajectory.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] if there are too many samples.
+    pub fn commands(&self) -> Result<Option<Vec<Vec<f64>>>, Error> {
+        let (Some(drives), Ok(designed)) = (&self.drives, &self.outcome) else { return Ok(None) };
+        Ok(Some(drives.told(&designed.motion.sampled()?.q)))
+    }
+
+    /// Writes [`DesignRun::commands`] with their times; nothing where there are none.
     ///
     /// # Errors
     /// [`Error::Trajectory`] if there are too many samples, [`Error::Output`].
     pub fn write_commands(&self, path: &Path) -> Result<(), Error> {
-        let (Some(drives), Ok(designed)) = (&self.drives, &self.outcome) else { return Ok(()) };
+        let (Some(told), Ok(designed)) = (self.commands()?, &self.outcome) else { return Ok(()) };
         let sampled = designed.motion.sampled()?;
-        let told = drives.told(&sampled.q);
         Ok(dynid_io::trajectory::write_commands(path, &designed.motion.joints, &sampled.time, &told)?)
     }
 

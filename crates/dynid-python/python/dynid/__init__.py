@@ -29,9 +29,11 @@ from ._native import (
     UnsupportedError,
     __version__,
 )
+from ._servo import CommandLog, Servo, servo
 from ._table import Table
 
 __all__ = [
+    "CommandLog",
     "Design",
     "DynidError",
     "DynidWarning",
@@ -46,6 +48,7 @@ __all__ = [
     "Online",
     "Robot",
     "RobotError",
+    "Servo",
     "SettingError",
     "Simulation",
     "Table",
@@ -61,5 +64,6 @@ __all__ = [
     "read_columns",
     "read_manifest",
     "reduce_log",
+    "servo",
     "simulate",
 ]

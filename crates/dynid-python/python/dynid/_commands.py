@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from ._estimate import Progress, native_logs, teller, written
 from ._log import Log
+from ._servo import Servo
+from ._robot_file import robot_keys
 from ._settings import as_json
 from ._table import Table
-
-
-@contextmanager
-def _keys(robot: _native.Robot, settings: Mapping[str, Any]) -> Iterator[str]:
-    """Settings with the robot and how it was read. A robot without a file has one meanwhile."""
-    clash = {"robot", "gravity", "locked", "couple_mimics"} & set(settings)
-    if clash:
-        raise TypeError(f"settings: {', '.join(sorted(clash))} belong to the robot, where it is made")
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.abspath(robot.path)
-        if robot.text is not None:
-            path = str(Path(folder) / "robot.toml")
-            if robot.text.lstrip().startswith("<"):
-                path = str(Path(folder) / "robot.urdf")
-            Path(path).write_text(robot.text, encoding="utf-8")
-        yield as_json({**settings, **json.loads(robot.options), "robot": path})
 
 
 def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> Table:
@@ -50,7 +35,8 @@ class Design:
     """A motion that tells the parameters apart, with what a log of it will tell.
 
     `feasible`; if so `t` `(n,)`, `q`, `v`, `a` `(n, joints)` of approach, periods and return, for `joints`. `record`: the keys of
-    `design.json`, with `parameters` (forecast of standard deviations) and `limits`.
+    `design.json`, with `parameters` (forecast of standard deviations) and `limits`. `commands` `(n, joints)`: what drives are told, in the numbers of
+    their encoders, of designs with `drives`.
     """
 
     def __init__(self, made: Mapping[str, Any]) -> None:
@@ -63,6 +49,7 @@ class Design:
         self.q: NDArray[np.float64] = made.get("q", empty)
         self.v: NDArray[np.float64] = made.get("v", empty)
         self.a: NDArray[np.float64] = made.get("a", empty)
+        self.commands: NDArray[np.float64] | None = made.get("commands")
 
     @property
     def headline(self) -> str:
@@ -81,10 +68,17 @@ def design(robot: _native.Robot, *, progress: Progress = None, threads: int = 0,
     """Designs an excitation trajectory within the limits of robot and surroundings.
 
     `settings` are the tables of a design file: `trajectory={"period_s": 10, "harmonics": 5}`, `limits={"share": 0.8}`, `keep=[...]`,
-    `search={"starts": 8}`, ... No motion within all limits is an outcome (`feasible`), not an error.
+    `search={"starts": 8}`, ... No motion within all limits is an outcome (`feasible`), not an error. `drives`: what `servo` found (or its `servo.json`),
+    for a log of commands and positions without efforts.
     """
-    with _keys(robot, settings) as config:
-        return Design(_native.design(config, progress=teller(progress), threads=threads))
+    with tempfile.TemporaryDirectory() as folder:
+        drives = settings.get("drives")
+        if isinstance(drives, Servo):
+            path = Path(folder) / "servo.json"
+            path.write_text(drives.to_json(), encoding="utf-8")
+            settings = {**settings, "drives": str(path)}
+        with robot_keys(robot, settings) as config:
+            return Design(_native.design(config, progress=teller(progress), threads=threads))
 
 
 class Online:
@@ -108,7 +102,7 @@ class Online:
         self._velocity = velocity
         prefixes = ["q", *(["dq"] if velocity else []), "tau"]
         header = ["t", *(f"{prefix}_{joint}" for prefix in prefixes for joint in self._names)]
-        with _keys(robot, settings) as config:
+        with robot_keys(robot, settings) as config:
             self._native = _native.Online(config, header)
 
     @property

@@ -1,0 +1,37 @@
+"""Robots on their way to work that takes them by their file."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from ._settings import as_json
+
+
+@contextmanager
+def robot_path(robot: _native.Robot) -> Iterator[str]:
+    """The file of a robot; one without a file has one meanwhile."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.abspath(robot.path)
+        if robot.text is not None:
+            path = str(Path(folder) / "robot.toml")
+            if robot.text.lstrip().startswith("<"):
+                path = str(Path(folder) / "robot.urdf")
+            Path(path).write_text(robot.text, encoding="utf-8")
+        yield path
+
+
+@contextmanager
+def robot_keys(robot: _native.Robot, settings: Mapping[str, Any]) -> Iterator[str]:
+    """Settings with the robot and how it was read."""
+    clash = {"robot", "gravity", "locked", "couple_mimics"} & set(settings)
+    if clash:
+        raise TypeError(f"settings: {', '.join(sorted(clash))} belong to the robot, where it is made")
+    with robot_path(robot) as path:
+        yield as_json({**settings, **json.loads(robot.options), "robot": path})
