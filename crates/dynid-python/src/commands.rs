@@ -39,6 +39,9 @@ pub(crate) fn check(
     as_json(&findings)
 }
 
+/// The record as JSON, the page, and files by name and text.
+type Drives = (String, String, Vec<(String, String)>);
+
 /// Identifies drives from commands and positions: the record as JSON, the page, and the files that other programs take, name and text.
 #[pyfunction]
 #[pyo3(signature = (config, *, progress=None, threads=0))]
@@ -47,7 +50,7 @@ pub(crate) fn servo(
     config: &str,
     progress: Option<Bound<'_, PyAny>>,
     threads: usize,
-) -> PyResult<(String, String, Vec<(String, String)>)> {
+) -> PyResult<Drives> {
     let config: ServoConfig = parsed(py, config, "settings of drives")?;
     work::run(py, progress, threads, move |tell| {
         let found = identify_servo(&config, &mut |step| {
