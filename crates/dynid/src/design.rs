@@ -31,7 +31,7 @@ pub use config::{
     TrajectoryConfig,
 };
 use drives::Drives;
-pub use drives::{FollowedJoint, FollowedRecord};
+pub use drives::{BrokenBehind, FollowedJoint, FollowedRecord};
 pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;
 pub use record::{DesignRecord, DesignVerdict};

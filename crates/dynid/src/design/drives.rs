@@ -5,14 +5,15 @@
 mod known;
 mod record;
 
+use dynid_excitation::constraint::ConstraintKind;
 use dynid_excitation::criterion::{Criterion, Measure};
 use dynid_excitation::{
-    ColumnInfo, Design, Forecast, MotionLimits, Outcome, PositionLoop, Problem, ServoColumn, ServoExcitation,
-    Settings, StartOutcome, forecast_by,
+    ColumnInfo, Design, Forecast, LimitKind, MotionLimits, Outcome, PositionLoop, Problem, ServoColumn,
+    ServoExcitation, Settings, StartOutcome, forecast_by,
 };
 use dynid_io::SourceFile;
 use dynid_linalg::Mat;
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_motion::trajectory::FourierBasis;
 use dynid_servo::forecast::{ServoForecast, forecast};
 use dynid_servo::{Chain, Free, Scheme, ServoJoint, ServoLog, ServoSettings, ServoValues, Term};
@@ -24,7 +25,7 @@ use crate::Error;
 use crate::robot::Robot;
 use crate::servo::{FoundDrives, ServoFault, ServoGroupRecord, clamped, member, set_terms};
 use known::{complete, laws, mean_inertias, model, noise, refuse, symbol, typical};
-pub use record::{FollowedJoint, FollowedRecord};
+pub use record::{BrokenBehind, FollowedJoint, FollowedRecord};
 
 /// Searches that go on within smaller limits, at most.
 const ROUNDS: usize = 6;
@@ -33,6 +34,9 @@ const ROOM: f64 = 0.005;
 /// Parts of the half range, and of the limit, by which a simulated joint may leave what its command keeps.
 const POSITION_EXCESS: f64 = 0.01;
 const SPEED_EXCESS: f64 = 0.05;
+const EFFORT_EXCESS: f64 = 0.01;
+/// Distance by which it may leave places that its command keeps, m.
+const PLACE_EXCESS: f64 = 1e-3;
 
 /// The drives of a robot that a motion is designed for.
 pub(super) struct Drives {
@@ -281,6 +285,7 @@ impl Drives {
         let unseen = (0..self.free.len()).filter(|k| !seen.contains(k));
         let record = FollowedRecord {
             joints,
+            breaks: self.broken(problem, &simulated),
             groups: simulated
                 .groups
                 .iter()
@@ -296,6 +301,37 @@ impl Drives {
         let samples = q.len() / self.joints.len().max(1);
         let by_joint = q.chunks_exact(samples.max(1)).zip(&self.values.joints);
         by_joint.map(|(q, joint)| q.iter().map(|q| joint.reading(*q)).collect()).collect()
+    }
+
+    /// Limits of places that the simulated robot breaks, each at its worst.
+    fn broken(&self, problem: &Problem, simulated: &ServoForecast) -> Vec<BrokenBehind> {
+        let (n, rows) = (self.joints.len(), simulated.reading.first().map_or(0, Vec::len));
+        let of_joint = |(joint, reading): (&ServoJoint, &Vec<f64>)| -> Vec<f64> {
+            reading.iter().map(|x| joint.position(*x)).collect()
+        };
+        let q: Vec<f64> = self.values.joints.iter().zip(&simulated.reading).flat_map(of_joint).collect();
+        // Places know nothing of rates.
+        let still = vec![0.0; n * rows];
+        let block = MotionBlock::plain(rows, &q, &still, &still);
+        let mut out: Vec<BrokenBehind> = Vec::new();
+        for constraint in &problem.constraints {
+            let about = constraint.rows();
+            let mut values = vec![0.0; about.len() * rows];
+            constraint.values(&block, rows, &mut values);
+            for (row, values) in about.iter().zip(values.chunks_exact(rows.max(1))) {
+                let excess = |x: &f64| (x - row.upper).max(row.lower - x) * row.scale;
+                let by_m = values.iter().map(excess).fold(f64::NEG_INFINITY, f64::max);
+                if row.kind == ConstraintKind::Effort || by_m <= PLACE_EXCESS {
+                    continue;
+                }
+                let (kind, subject) = (LimitKind::Path(row.kind).to_string(), row.subject.clone());
+                match out.iter_mut().find(|b| b.kind == kind && b.subject == subject) {
+                    Some(known) => known.by_m = known.by_m.max(by_m),
+                    None => out.push(BrokenBehind { kind, subject, by_m }),
+                }
+            }
+        }
+        out
     }
 
     fn followed(&self, j: usize, commands: &ServoLog, simulated: &ServoForecast) -> FollowedJoint {
@@ -378,8 +414,31 @@ impl Drives {
     }
 
     /// What the simulated robot does beyond the limits of what it was told, in words.
-    pub(super) fn excesses(&self, limits: &[MotionLimits], followed: &FollowedRecord) -> Vec<String> {
+    /// `efforts`: limits that are kept, by joint.
+    pub(super) fn excesses(
+        &self,
+        limits: &[MotionLimits],
+        efforts: &[Option<f64>],
+        followed: &FollowedRecord,
+    ) -> Vec<String> {
         let mut out = Vec::new();
+        for broken in &followed.breaks {
+            out.push(format!(
+                "the simulated robot, which is not where its command is, breaks a limit that the command keeps: {} of {} by {:.0} mm; raise `margin_m`, or \
+                 lower `share` or `acceleration`",
+                broken.kind,
+                broken.subject,
+                1e3 * broken.by_m
+            ));
+        }
+        for (joint, limit) in followed.joints.iter().zip(efforts) {
+            if let Some(limit) = limit.filter(|limit| joint.effort > (1.0 + EFFORT_EXCESS) * limit) {
+                out.push(format!(
+                    "the simulated drive of `{}` pushes with {:.2} where {limit:.2} is the limit: lower `share`, or `acceleration`",
+                    joint.joint, joint.effort
+                ));
+            }
+        }
         for ((limit, joint), slides) in limits.iter().zip(&followed.joints).zip(&self.slides) {
             let unit = if *slides { "m" } else { "rad" };
             let [low, high] = joint.position;

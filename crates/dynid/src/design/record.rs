@@ -396,8 +396,11 @@ impl DesignRun {
                 way_out(fault.kind, &fault.subject).map_or_else(String::new, |line| format!("; {line}"))
             ));
         }
+        let rows = self.set.problem.constraints.iter().flat_map(|c| c.rows());
+        let are_kept = rows.map(|row| row.kind).any(|kind| kind == ConstraintKind::Effort);
+        let efforts: &[Option<f64>] = if are_kept { &self.set.effort_limits } else { &[] };
         let excesses = match (&self.drives, &designed.followed) {
-            (Some(drives), Some(followed)) => drives.excesses(&self.set.problem.limits, followed),
+            (Some(drives), Some(followed)) => drives.excesses(&self.set.problem.limits, efforts, followed),
             _ => Vec::new(),
         };
         let leaves = !excesses.is_empty();
@@ -434,8 +437,17 @@ impl DesignRun {
         let near = self.near_best(designed);
         let sound = designed.motion.leg_faults.is_empty() && !leaves;
         let status = if sound { Outcome::Pass } else { Outcome::Warn };
+        let of = match (&self.drives, leaves) {
+            (None, _) => "all limits hold at every instant of the period",
+            (Some(_), false) => {
+                "all limits of the command hold at every instant of the period, those of position, speed, effort and place for the simulated robot too"
+            }
+            (Some(_), true) => {
+                "all limits hold at every instant of the period for the command alone, the simulated robot breaks some (see the warnings)"
+            }
+        };
         let headline = format!(
-            "all limits hold at every instant of the period: {}; not checked: {}; {near} of {} starts ended within {:.0} % of \
+            "{of}: {}; not checked: {}; {near} of {} starts ended within {:.0} % of \
              the best",
             self.kept().join(", "),
             self.set.safety.record.not_checked.join(", "),

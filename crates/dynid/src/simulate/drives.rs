@@ -46,7 +46,11 @@ pub fn simulate_drives(
     let bare = ElementPlan::new(mechanism, &dynid_io::ElementSpec::default(), Some(&[]), |_| true)?;
     let model: Arc<RobotModel> = Arc::new(bare.model(mechanism)?);
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let (reference, _) = Reference::new(&model, settings, &mut rng)?;
+    let (reference, channels) = Reference::new(&model, settings, &mut rng)?;
+    if let Some(channel) = channels.keys().next() {
+        let expected = "a motion without channels beside `drives`, which read none";
+        return Err(Error::setting("follow", expected, channel));
+    }
     let duration_s = reference.duration().unwrap_or(settings.duration_s);
     let rows = (duration_s * settings.rate_hz + 1e-6).floor() as usize + 1;
     let time: Vec<f64> = (0..rows).map(|s| s as f64 / settings.rate_hz).collect();

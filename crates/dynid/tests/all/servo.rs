@@ -418,6 +418,44 @@ fn a_motion_designed_from_a_first_log_tells_more_and_what_it_promised() {
 }
 
 #[test]
+fn a_robot_that_sags_below_what_its_command_keeps_is_told() {
+    use dynid::design::{DesignConfig, design};
+    use dynid::simulate::{SimulateSettings, simulate_drives};
+    let folder = folder();
+    first_log(&folder);
+    let text = "robot = \"arm.urdf\"\ndrives = \"first.json\"\n[limits]\nacceleration = 20\nvelocity = 3\n\
+        position = { lift = [-1.2, 1.2], elbow = [-1.2, 1.2] }\n[[keep]]\nframes = [\"fore\"]\npoint = [0.24, 0, 0]\nabove = -0.1\n\
+        [safety]\nfloor = false\nself_collision = false\n[search]\nstarts = 1\n";
+    let path = folder.path().join("design.toml");
+    std::fs::write(&path, text).unwrap();
+    let config = DesignConfig::read(&path).unwrap();
+    let run = design(&config, &mut |_| {}).unwrap();
+    assert!(run.outcome.as_ref().unwrap().broken.is_empty(), "the command keeps its limits");
+    let record = run.record(&config).unwrap();
+    // Played by the same drives, the end of the arm by two sines: joints turn about y, which takes x below.
+    let motion = &run.outcome.as_ref().unwrap().motion;
+    motion.file.write(folder.path().join("trajectory.json")).unwrap();
+    let settings = SimulateSettings {
+        drives: Some(folder.path().join("first.json")),
+        follow: Some(folder.path().join("trajectory.json")),
+        rate_hz: 100.0,
+        ..SimulateSettings::default()
+    };
+    let made =
+        simulate_drives(&folder.path().join("arm.urdf"), &Default::default(), None, &settings).unwrap();
+    let [lift, elbow] = [0, 1].map(|j| &made.clean[0][j]);
+    let heights = lift.iter().zip(elbow).map(|(a, b)| -(0.3 * a.sin() + 0.24 * (a + b).sin()));
+    let below = -0.1 - heights.fold(f64::INFINITY, f64::min);
+    let breaks = &record.followed.as_ref().unwrap().breaks;
+    let [broken] = &breaks[..] else { panic!("{breaks:?}") };
+    assert!(broken.subject == "fore" && below > 0.005, "{broken:?} {below}");
+    assert!((broken.by_m - below).abs() < 1e-4, "{broken:?} {below}");
+    assert_eq!(record.verdict.status, dynid::record::Outcome::Warn);
+    assert!(record.verdict.headline.contains("for the command alone"), "{}", record.verdict.headline);
+    assert!(record.verdict.warnings.iter().any(|w| w.contains("distance from a plane of fore")));
+}
+
+#[test]
 fn designs_for_drives_say_what_they_need() {
     use dynid::design::{DesignConfig, design};
     let folder = folder();

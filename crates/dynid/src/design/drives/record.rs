@@ -9,10 +9,23 @@ use crate::servo::ServoGroupRecord;
 pub struct FollowedRecord {
     /// Joints.
     pub joints: Vec<FollowedJoint>,
+    /// Limits of places (floor, own links, `[[keep]]`, capsules) that the command keeps and the simulated robot breaks.
+    pub breaks: Vec<BrokenBehind>,
     /// Parameters that will be known together only.
     pub groups: Vec<ServoGroupRecord>,
     /// Parameters that no reading depends on.
     pub unseen: Vec<String>,
+}
+
+/// A limit that the command keeps and the simulated robot breaks.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct BrokenBehind {
+    /// What is limited.
+    pub kind: String,
+    /// Whose: link, or pair of links.
+    pub subject: String,
+    /// By how much, m.
+    pub by_m: f64,
 }
 
 /// Where commands lead a joint. Units are rad or m, s, N m or N.
