@@ -1,25 +1,16 @@
-//! Efforts that depend on position.
+//! A spring between a joint and the body that carries it.
 
 use super::friction::EFFORT;
 use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
-use dynid_algebra::scalar::{Jet, Scalar};
+use dynid_algebra::scalar::{Jet, Scalar as _};
 
 /// Linear spring `k (q - q₀) = k q - (k q₀)`, two columns `[q, -1]` for `k` and `k q₀`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spring {
     /// Rate it acts on.
     pub rate: usize,
-}
-
-/// Torque that repeats `cycles` times a turn: `A cos(n q) + B sin(n q)`, two columns.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CyclicTorque {
-    /// Rate it acts on.
-    pub rate: usize,
-    /// Repetitions per turn `n`: 1, a tooth count, a number of pole pairs.
-    pub cycles: f64,
 }
 
 impl JointElement for Spring {
@@ -52,41 +43,5 @@ impl JointElement for Spring {
     ) {
         let position = joints[self.rate].position;
         weights.add(0, position, motion.position(position), |_| 1.0, &mut out.q);
-    }
-}
-
-impl JointElement for CyclicTorque {
-    fn rates(&self) -> Vec<usize> {
-        vec![self.rate]
-    }
-    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
-        let joint = &joints[self.rate];
-        vec![joint.parameter("ca", EFFORT, None), joint.parameter("cb", EFFORT, None)]
-    }
-    fn entries(&self) -> Vec<(usize, usize)> {
-        vec![(self.rate, 0), (self.rate, 1)]
-    }
-    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
-        let q = motion.position(joints[self.rate].position);
-        out.map(0, q, |q| (self.cycles * q).cos());
-        out.map(1, q, |q| (self.cycles * q).sin());
-    }
-    fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
-        let (sine, cosine) = motion.q[joints[self.rate].position].scaled(self.cycles).sin_cos();
-        [out[0], out[1]] = [cosine, sine];
-        true
-    }
-    fn adjoint(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-        _: &[f64],
-        weights: &ElementWeights<'_>,
-        out: &mut MotionAdjoint,
-    ) {
-        let position = joints[self.rate].position;
-        let (n, q) = (self.cycles, motion.position(position));
-        weights.add(0, position, q, |q| -n * (n * q).sin(), &mut out.q);
-        weights.add(1, position, q, |q| n * (n * q).cos(), &mut out.q);
     }
 }

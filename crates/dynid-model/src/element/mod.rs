@@ -6,6 +6,7 @@
 mod channel;
 mod clearance;
 mod compliance;
+mod cyclic;
 mod drive;
 mod elastic;
 mod external_load;
@@ -25,7 +26,8 @@ mod transmission;
 use channel::temperature_of;
 pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use clearance::{ClearanceContact, FrictionLine, JournalContact, JournalMotion, impact_speed_signal};
-pub use compliance::{CyclicTorque, Spring};
+pub use compliance::Spring;
+pub use cyclic::Cyclic;
 pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
 pub use external_load::{ExternalLoad, load_channel};

@@ -4,8 +4,9 @@
 
 use crate::random_tree::{self, check_close, generator, numbers, sample, tree};
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
-    LoadFriction, Offset, RotorInertia, Spring, Transmission, Viscous, current_channel, load_channel,
+    AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, DriveGain, ExternalLoad, JointElement, Linearised,
+    LoadFriction, Offset, RotorInertia, ShapeSetting, Spring, Transmission, Viscous, current_channel,
+    load_channel,
 };
 use dynid_model::scalar::Dual;
 use dynid_model::*;
@@ -187,14 +188,15 @@ fn model_with_elements() -> RobotModel {
     }
     let mechanism = d.build().unwrap();
     let reference: Vec<f64> = mechanism.inertia_vector();
-    let elements: Vec<Box<dyn JointElement>> = vec![
+    let mut elements: Vec<Box<dyn JointElement>> = vec![
         Box::new(Coulomb { rate: 0 }),
         Box::new(Viscous { rate: 0 }),
         Box::new(Offset { rate: 0 }),
         Box::new(AsymmetricFriction { rate: 1 }),
         Box::new(RotorInertia { rate: 1 }),
         Box::new(Spring { rate: 2 }),
-        Box::new(CyclicTorque { rate: 3, cycles: 7.0 }),
+        Box::new(Cyclic::torque(3, ShapeSetting::held(7.0))),
+        Box::new(Cyclic::friction(0, ShapeSetting::held(3.0))),
         Box::new(Transmission {
             joints: vec![0, 1, 3],
             matrix: vec![vec![1.0, 0.0, 0.5], vec![-0.7, 2.0, 0.3]],
@@ -206,6 +208,13 @@ fn model_with_elements() -> RobotModel {
         Box::new(ExternalLoad { rate: 2, brake: false }),
         Box::new(LoadFriction::new(&mechanism, vec![0, 2], reference.into())),
     ];
+    let joints = RobotModel::new(mechanism.clone(), Vec::new()).joints().to_vec();
+    let free = ShapeSetting { start: 2.5, lower: 1.0, upper: 9.0, held: false };
+    // With the column of a change of `n`.
+    for element in [Cyclic::torque(1, free), Cyclic::friction(1, free)] {
+        let own = Linearised::new(Box::new(element), &joints, vec![2.5], vec![0.3, -0.8], vec![true]);
+        elements.push(Box::new(own));
+    }
     RobotModel::new(mechanism, elements)
 }
 

@@ -4,7 +4,7 @@
 
 use crate::random_tree::tree;
 use dynid_model::element::{
-    Arctangent, AsymmetricFriction, Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission,
+    Arctangent, AsymmetricFriction, Coulomb, CubicSpring, Cyclic, ElasticDoubt, ElasticTransmission,
     ExponentialViscous, ExternalLoad, JetMotion, JointElement, LuGre, Offset, PiecewiseSpring, PowerLaw,
     RotorInertia, ShapeSetting, Sigmoid, SigmoidOffset, Spring, Stribeck, StribeckViscous, TanhFriction,
     Viscous, ViscousMagnitude,
@@ -60,7 +60,7 @@ fn input_friction_and_cyclic_torque_are_those_of_the_golden_file() {
         Box::new(TanhFriction { rate: 1, w: held(p("omega1")) }),
         Box::new(fading),
         Box::new(Coulomb { rate: 1 }),
-        Box::new(CyclicTorque { rate: 0, cycles: 1.0 }),
+        Box::new(Cyclic::torque(0, ShapeSetting::held(1.0))),
     ]);
     let names: Vec<&str> = joint.parameters().linear.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["motor.fv", "motor.ft", "motor.fvs", "motor.fc", "link.ca", "link.cb"]);
@@ -382,7 +382,7 @@ fn base_parameters_of_elastic_arms_are_those_of_the_rigid_arm_and_all_of_the_dri
         Box::new(Viscous { rate: 1 }),
         Box::new(Coulomb { rate: 0 }),
         Box::new(Viscous { rate: 0 }),
-        Box::new(CyclicTorque { rate: 0, cycles: 1.0 }),
+        Box::new(Cyclic::torque(0, ShapeSetting::held(1.0))),
     ]);
     let base = BaseParameters::of(&joint, joint.mechanism(), &[], &settings);
     assert_eq!((base.len(), base.gap.dropped), (9, None));
@@ -459,7 +459,7 @@ fn jets_of_bodies_and_elements_are_their_derivatives_by_time() {
         Box::new(Offset { rate: 0 }),
         Box::new(RotorInertia { rate: 1 }),
         Box::new(Spring { rate: 2 }),
-        Box::new(CyclicTorque { rate: 1, cycles: 3.0 }),
+        Box::new(Cyclic::torque(1, ShapeSetting::held(3.0))),
         Box::new(TanhFriction { rate: 2, w: held(0.7) }),
         Box::new(Arctangent { rate: 0, fb: held(1.7) }),
         Box::new(Stribeck { rate: 1, vs: held(0.9), delta: held(1.4) }),

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, Coulomb, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid,
+    Arctangent, Coulomb, Cyclic, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid,
     SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
 use dynid_model::*;
@@ -35,9 +35,10 @@ fn model(joints: usize, elements: Vec<Box<dyn JointElement>>) -> RobotModel {
     RobotModel::new(d.build().unwrap(), elements)
 }
 
-/// Motion of which only the speeds matter: the same for every joint, a little faster from joint to joint.
+/// Motion of which speeds matter, the same for every joint, a little faster from joint to joint, and places, which run through a third of a turn.
 struct Speeds {
     samples: usize,
+    q: Vec<f64>,
     dq: Vec<f64>,
     rest: Vec<f64>,
 }
@@ -46,14 +47,15 @@ impl Speeds {
     fn new(joints: usize, v: &[f64]) -> Self {
         let dq: Vec<f64> =
             (0..joints).flat_map(|j| v.iter().map(move |v| v * (1.0 + 0.1 * j as f64))).collect();
-        Speeds { samples: v.len(), rest: vec![0.0; dq.len()], dq }
+        let q = (0..dq.len()).map(|k| 0.4 + 2.0 * k as f64 / dq.len() as f64).collect();
+        Speeds { samples: v.len(), rest: vec![0.0; dq.len()], q, dq }
     }
 
     fn block(&self, sign_width: f64) -> MotionBlock<'_> {
         MotionBlock {
             samples: self.samples,
             stride: self.samples,
-            q: &self.rest,
+            q: &self.q,
             dq: &self.dq,
             ddq: &self.rest,
             gravity: None,
@@ -170,6 +172,9 @@ fn all_elements() -> Vec<Box<dyn JointElement>> {
         }),
         Box::new(LuGre { kappa: free(700.0), rho: free(1.4), vs: free(0.2), delta: free(1.4), rate: 1 }),
         Box::new(LuGre::new(3)),
+        Box::new(Cyclic::torque(0, free(5.0))),
+        Box::new(Cyclic::friction(1, free(2.5))),
+        Box::new(Cyclic::friction(2, ShapeSetting::held(3.0))),
     ]
 }
 

@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, JointElement, Offset, RotorInertia,
-    Spring, Transmission, Viscous,
+    Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, JointElement, Offset, RotorInertia,
+    ShapeSetting, Spring, Transmission, Viscous,
 };
 use dynid_model::*;
 pub(crate) use dynid_testing::golden;
@@ -381,7 +381,7 @@ fn linear_elements_follow_their_laws() {
     check_close(&e, &numbers(&s["effort"]), 0.0, 1e-12, "spring");
     let c = &g["cyclic"];
     let values = [c["a"].as_f64().unwrap(), c["b"].as_f64().unwrap()];
-    let element = CyclicTorque { rate: 0, cycles: c["n"].as_f64().unwrap() };
+    let element = Cyclic::torque(0, ShapeSetting::held(c["n"].as_f64().unwrap()));
     let e = effort(Box::new(element), &q, &zero, &zero, &values);
     check_close(&e, &numbers(&c["effort"]), 0.0, 1e-12, "cyclic");
 }

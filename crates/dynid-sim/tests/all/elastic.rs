@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::arm::arm;
 use dynid_model::element::{
-    Coulomb, CubicSpring, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, LuGre, RotorInertia,
-    Transmission, Viscous,
+    Coulomb, CubicSpring, Cyclic, ElasticTransmission, ExternalLoad, JointElement, LuGre, RotorInertia,
+    ShapeSetting, Transmission, Viscous,
 };
 use dynid_model::*;
 use dynid_sim::*;
@@ -34,7 +34,7 @@ fn joint_model() -> RobotModel {
         Box::new(Viscous { rate: 1 }),
         Box::new(Coulomb { rate: 0 }),
         Box::new(Coulomb { rate: 1 }),
-        Box::new(CyclicTorque { rate: 0, cycles: 1.0 }),
+        Box::new(Cyclic::torque(0, ShapeSetting::held(1.0))),
     ];
     let brake = KnownElement {
         element: Box::new(ExternalLoad { rate: 0, brake: true }),

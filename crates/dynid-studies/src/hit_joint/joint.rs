@@ -1,7 +1,7 @@
 //! The joint: two coordinates without bodies, the link with its torque sensor and the motor.
 
 use dynid::model::element::{
-    Coulomb, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, RotorInertia, ShapeSetting,
+    Coulomb, Cyclic, ElasticTransmission, ExternalLoad, JointElement, RotorInertia, ShapeSetting,
     StribeckViscous, TanhFriction, Viscous,
 };
 use dynid::model::{Coordinate, KnownElement, Mechanism, RobotModel};
@@ -44,7 +44,7 @@ fn damping(damping: Damping) -> Vec<Box<dyn JointElement>> {
         }
     }
     if damping == Damping::Cyclic {
-        elements.push(Box::new(CyclicTorque { rate: LINK, cycles: 1.0 }));
+        elements.push(Box::new(Cyclic::torque(LINK, ShapeSetting::held(1.0))));
     }
     elements
 }
@@ -81,7 +81,7 @@ fn extra_elements(settings: &Settings, extras: Extras) -> (Vec<Box<dyn JointElem
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
     let mut linear = Vec::new();
     if extras.cyclic {
-        elements.push(Box::new(CyclicTorque { rate: LINK, cycles: 1.0 }));
+        elements.push(Box::new(Cyclic::torque(LINK, ShapeSetting::held(1.0))));
         let (sine, cosine) = full.cyclic_phase.sin_cos();
         linear.extend([full.cyclic * sine, full.cyclic * cosine]);
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynid::friction::KnownFriction;
 use dynid::friction::model::{BristleModel, ExponentialModel, ViscousModel};
-use dynid::model::element::{Coulomb, CyclicTorque, JointElement, Offset, RotorInertia, Viscous};
+use dynid::model::element::{Coulomb, Cyclic, JointElement, Offset, RotorInertia, ShapeSetting, Viscous};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
 use dynid::sim::Plant;
 use dynid::{Robot, RobotOptions};
@@ -162,7 +162,9 @@ impl Indy7 {
 
 /// Torque ripple of given orders at a joint.
 pub(super) fn ripple(rate: usize, orders: &[u32]) -> Vec<Box<dyn JointElement>> {
-    let order = |n: &u32| -> Box<dyn JointElement> { Box::new(CyclicTorque { rate, cycles: f64::from(*n) }) };
+    let order = |n: &u32| -> Box<dyn JointElement> {
+        Box::new(Cyclic::torque(rate, ShapeSetting::held(f64::from(*n))))
+    };
     orders.iter().map(order).collect()
 }
 

@@ -15,6 +15,8 @@ pub mod units {
     pub const PER_ANGLE: [&str; 2] = ["1/rad", "1/m"];
     /// Of what multiplies a speed.
     pub const PER_SPEED: [&str; 2] = ["s/rad", "s/m"];
+    /// Of repetitions over a turn, or over `2π` of a slide.
+    pub const REPETITIONS: [&str; 2] = ["1", "rad/m"];
     /// Of a number.
     pub const NUMBER: [&str; 2] = ["1", "1"];
 }

@@ -3,7 +3,7 @@
 use super::kind::{Build, Candidate, ElementKind, OptionTerm, Placement};
 use crate::element::law::units::{NUMBER, PER_SPEED, VISCOUS};
 use crate::element::{
-    AtJoint, CyclicTorque, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, ReactionFriction,
+    AtJoint, Cyclic, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, ReactionFriction,
     RotorInertia, Spring, Stribeck, VelocityLaw, laws,
 };
 
@@ -64,11 +64,9 @@ fn of(
 }
 
 fn others() -> Vec<ElementKind> {
-    let cyclic = of("cyclic", &[LinearTerm::effort("ca"), LinearTerm::effort("cb")], |p| {
-        Ok(Box::new(CyclicTorque { rate: p.rate, cycles: p.number("cycles").unwrap_or(1.0) }))
-    });
-    let cycles =
-        OptionTerm::Number { key: "cycles", default: "1", expected: "a number above 0", holds: |x| x > 0.0 };
+    let cyclic = of("cyclic", &Cyclic::TORQUE, |p| Ok(Box::new(Cyclic::torque(p.rate, p.shape[0]))));
+    let friction =
+        of("cyclic_friction", &Cyclic::FRICTION, |p| Ok(Box::new(Cyclic::friction(p.rate, p.shape[0]))));
     vec![
         of("rotor", &[LinearTerm::new("Ia", ["kg m²", "kg"]).at_least(0.0)], |p| {
             Ok(Box::new(RotorInertia { rate: p.rate }))
@@ -83,9 +81,12 @@ fn others() -> Vec<ElementKind> {
         )
         .equation("k (q - q0)")
         .help("`kq0 = k q0`"),
-        ElementKind { options: vec![cycles], ..cyclic }
+        ElementKind { shape: vec![Cyclic::TORQUE_CYCLES], ..cyclic }
             .equation("ca cos(n q) + cb sin(n q)")
-            .help("`n` set by `cyclic = { cycles = n }`"),
+            .help("torque ripple: `n` repetitions per turn, set by `cyclic = { cycles = n }`"),
+        ElementKind { shape: vec![Cyclic::FRICTION_CYCLES], ..friction }
+            .equation("sign(q̇) (fca cos(n q) + fcb sin(n q))")
+            .help("friction that changes over a turn: `cyclic_friction = { friction_cycles = n }`; beside `coulomb`"),
         of("drive_gain", &[LinearTerm::new("K", ["N m/A", "N/A"]).at_least(0.0)], |p| {
             Ok(Box::new(DriveGain { rate: p.rate }))
         })
