@@ -69,7 +69,12 @@ impl Kernel {
 
     /// Standard deviation in time, s.
     pub fn standard_deviation(&self) -> f64 {
-        SD_OF_CUTOFF / self.cutoff_hz
+        Self::standard_deviation_at(self.cutoff_hz)
+    }
+
+    /// Standard deviation in time of kernels of a nominal cut-off, s.
+    pub fn standard_deviation_at(cutoff_hz: f64) -> f64 {
+        SD_OF_CUTOFF / cutoff_hz
     }
 
     /// Distance of rows that are worth having, a quarter of `1 / cutoff`, samples (at least 1).

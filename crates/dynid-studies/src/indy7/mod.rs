@@ -1,5 +1,6 @@
 //! Indy7: friction of speed and temperature first, rigid bodies second. See `README.md` in this folder.
 
+mod cyclic;
 mod dynamics;
 mod estimators;
 mod excitation;

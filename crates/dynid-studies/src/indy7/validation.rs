@@ -1,10 +1,10 @@
 //! Rows 9 to 11 and what goes beyond: estimates at work on other trajectories, cold and hot.
 
 use dynid::estimators::conditioning::PreparedLog;
-use dynid::estimators::cyclic::find_cyclic;
 use dynid::model::KnownElement;
 use rayon::prelude::*;
 
+use super::cyclic::find_cyclic;
 use super::experiment::{Experiment, constant, trajectory};
 use super::friction::{JointFriction, experiment};
 use super::identification::{Identified, OURS, PAPER, regression, regression_of};

@@ -2,13 +2,13 @@
 
 /// A cyclic effort `A cos nq + B sin nq` found in residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CyclicFinding {
+pub(super) struct CyclicFinding {
     /// Repetitions `n` per turn (per `2π` metres for joints that slide).
-    pub cycles: u32,
+    pub(super) cycles: u32,
     /// Amplitude `√(A² + B²)` over all samples, effort.
-    pub amplitude: f64,
+    pub(super) amplitude: f64,
     /// Share of the residual sum of squares that is gone on halves which the coefficients were not fitted to.
-    pub gain: f64,
+    pub(super) gain: f64,
 }
 
 /// The cyclic effort of at most `most_cycles` repetitions that explains residuals best; `None` if the best of them gains less
@@ -19,7 +19,7 @@ pub struct CyclicFinding {
 ///
 /// # Panics
 /// If the lengths differ.
-pub fn find_cyclic(
+pub(super) fn find_cyclic(
     position: &[f64],
     residual: &[f64],
     most_cycles: u32,

@@ -1,0 +1,289 @@
+//! The search: orders from a spectrum, judged on held-out parts.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Row;
+use super::score::{Score, rss, score, without_friction, without_order};
+use super::spectrum::spectrum;
+
+/// Rows of one joint's residuals behind a Gaussian kernel.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CyclicRows {
+    /// Position, rad or m.
+    pub position: Vec<f64>,
+    /// Velocity, rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// Measured less predicted effort, N m or N.
+    pub residual: Vec<f64>,
+    /// Weight: 1 over the standard deviation of the rows of the log.
+    pub weight: Vec<f64>,
+    /// Part of the motion that a row lies in, below `parts`: rows of one part are held out together. Where a motion repeats, the same places
+    /// of all periods are one part.
+    pub part: Vec<usize>,
+    /// Number of parts.
+    pub parts: usize,
+    /// Standard deviation of the kernel, s.
+    pub kernel_s: f64,
+}
+
+/// When a cyclic effort is believed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclicSettings {
+    /// Fewest periods over the range of the joint. What repeats less often is a slow change with position, which another motion need not share.
+    /// Default 3.
+    pub least_periods: f64,
+    /// Standard errors that the gain on held-out parts must be of: so many that hundreds of orders which are tried do not pass by chance. Default 3.
+    pub sigmas: f64,
+    /// Share of the mean square residual that must be gone on held-out parts. Default 0.03.
+    pub least_gain: f64,
+    /// Fewest parts that hold rows. Default 8.
+    pub least_parts: usize,
+    /// Fewest passes of the joint, from turn to turn. On a single one a vibration, which repeats in time, looks like ripple; a place that is passed
+    /// again finds it in another phase. Default 4.
+    pub least_passes: usize,
+}
+
+impl Default for CyclicSettings {
+    fn default() -> Self {
+        CyclicSettings { least_periods: 3.0, sigmas: 3.0, least_gain: 0.03, least_parts: 8, least_passes: 4 }
+    }
+}
+
+/// A cyclic effort found in residuals, `w (A cos nq + B sin nq)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CyclicFinding {
+    /// `w` is the sign of the velocity: friction that changes over a turn. Otherwise it is 1: torque ripple.
+    pub is_friction: bool,
+    /// Repetitions `n` per turn (per `2π` metres for joints that slide).
+    pub cycles: f64,
+    /// A quarter of the distance of orders that the range of the joint tells apart.
+    pub resolution: f64,
+    /// Amplitude `√(A² + B²)`, N m or N.
+    pub amplitude: f64,
+    /// Share by which the mean square residual falls on held-out parts.
+    pub gain: f64,
+    /// Standard error of the gain over parts.
+    pub standard_error: f64,
+}
+
+/// Slower rows, in parts of the rms speed, count as rest.
+const REST: f64 = 0.05;
+/// Share of the rows that is slow enough for the largest order to pass the kernel.
+const SLOWEST: f64 = 0.2;
+/// Peaks of a spectrum that are judged.
+const TRIED: usize = 3;
+/// Part of what is asked for that a line of the spectrum must show: the order between the lines shows more.
+const NEAR: f64 = 0.7;
+/// Steps of the search for the order between its neighbours.
+const STEPS: usize = 24;
+/// The part of an interval that a golden section keeps.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
+/// The cyclic efforts that residuals of a joint show: at most one torque and one friction, the one that gains more first.
+///
+/// The order `n` is looked for between `least_periods` over the range of the joint and the largest whose ripple passes the kernel in a fifth of
+/// the rows. At a row the kernel leaves `exp(-½ (n v σ)²)` of a ripple, `v` its speed, `σ` the kernel's standard deviation. Peaks of the spectrum
+/// over position are fitted without one part of the motion each and judged there; what passes is taken off before more is looked for.
+///
+/// # Panics
+/// If the lists differ in length or a part is not below `parts`.
+pub fn find_cyclic(rows: &CyclicRows, settings: &CyclicSettings) -> Vec<CyclicFinding> {
+    let Some(mut search) = Search::new(rows, settings) else { return Vec::new() };
+    let mut out = Vec::new();
+    let mut kinds = vec![false, true];
+    while let Some(found) = search.next(&kinds) {
+        kinds.retain(|is_friction| *is_friction != found.is_friction);
+        out.push(found);
+    }
+    out
+}
+
+struct Search<'a> {
+    settings: &'a CyclicSettings,
+    rows: Vec<Row>,
+    parts: usize,
+    kernel_s: f64,
+    range: (f64, f64),
+    orders: (f64, f64),
+}
+
+impl<'a> Search<'a> {
+    /// `None` where no order can be told.
+    fn new(given: &CyclicRows, settings: &'a CyclicSettings) -> Option<Self> {
+        let CyclicRows { position, velocity, residual, weight, part, parts, kernel_s } = given;
+        let lengths = [position.len(), velocity.len(), residual.len(), weight.len(), part.len()];
+        assert!(lengths.iter().all(|n| *n == lengths[0]), "lists of {lengths:?} rows");
+        let square: f64 = velocity.iter().map(|v| v * v).sum();
+        let rest = REST * (square / lengths[0].max(1) as f64).sqrt();
+        let mut rows: Vec<Row> = (0..lengths[0])
+            .filter(|k| velocity[*k].abs() > rest)
+            .map(|k| Row {
+                position: position[k],
+                velocity: velocity[k],
+                residual: residual[k],
+                weight: weight[k],
+                part: part[k],
+            })
+            .collect();
+        let mut held = vec![false; *parts];
+        rows.iter().for_each(|row| held[row.part] = true);
+        if rows.is_empty() || held.iter().filter(|held| **held).count() < settings.least_parts {
+            return None;
+        }
+        let turns = rows.windows(2).filter(|w| w[0].velocity.signum() != w[1].velocity.signum()).count();
+        if turns + 1 < settings.least_passes {
+            return None;
+        }
+        let mut speeds: Vec<f64> = rows.iter().map(|r| r.velocity.abs()).collect();
+        let place = (SLOWEST * (speeds.len() - 1) as f64) as usize;
+        let slow = *speeds.select_nth_unstable_by(place, f64::total_cmp).1;
+        let low = rows.iter().map(|r| r.position).fold(f64::INFINITY, f64::min);
+        let high = rows.iter().map(|r| r.position).fold(f64::NEG_INFINITY, f64::max);
+        let orders = (settings.least_periods * TAU / (high - low), 1.0 / (kernel_s * slow));
+        if !(orders.0 < orders.1 && orders.1.is_finite()) {
+            return None;
+        }
+        without_friction(&mut rows);
+        Some(Search { settings, rows, parts: *parts, kernel_s: *kernel_s, range: (low, high), orders })
+    }
+
+    /// The best of the kinds that passes, taken off the residuals.
+    fn next(&mut self, kinds: &[bool]) -> Option<CyclicFinding> {
+        let lines = spectrum(&self.rows, self.kernel_s, self.range, self.orders);
+        let resolution = PI / (2.0 * (self.range.1 - self.range.0));
+        let mut best: Option<(bool, f64, Score)> = None;
+        for is_friction in kinds {
+            let share = |k: usize| lines[k].shares[usize::from(*is_friction)];
+            let worth = NEAR * self.settings.least_gain;
+            let is_peak = |k: &usize| {
+                let above =
+                    |other: Option<usize>| other.is_none_or(|o| o >= lines.len() || share(o) < share(*k));
+                share(*k) >= worth && above(k.checked_sub(1)) && above(Some(k + 1))
+            };
+            let mut peaks: Vec<usize> = (0..lines.len()).filter(is_peak).collect();
+            peaks.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
+            for k in peaks.into_iter().take(TRIED) {
+                let judged = |n: f64| score(&self.rows, self.parts, n, *is_friction, self.kernel_s);
+                if judged(lines[k].order).is_none_or(|found| !self.passes(&found, NEAR)) {
+                    continue;
+                }
+                let cycles = self.refined(lines[k].order, *is_friction, resolution);
+                let Some(found) = judged(cycles).filter(|found| self.passes(found, 1.0)) else { continue };
+                if best.is_none_or(|(.., other)| found.mean > other.mean) {
+                    best = Some((*is_friction, cycles, found));
+                }
+            }
+        }
+        let (is_friction, cycles, found) = best?;
+        without_order(&mut self.rows, cycles, is_friction, found.coefficients, self.kernel_s);
+        let [a, b] = found.coefficients;
+        let left = (-found.mean).exp();
+        Some(CyclicFinding {
+            is_friction,
+            cycles,
+            resolution,
+            amplitude: a.hypot(b),
+            gain: 1.0 - left,
+            standard_error: left * found.error,
+        })
+    }
+
+    /// Whether an order gains enough; `share`: of what is asked for.
+    fn passes(&self, found: &Score, share: f64) -> bool {
+        let least = -(1.0 - self.settings.least_gain).ln();
+        found.mean >= share * least && found.mean > share * self.settings.sigmas * found.error
+    }
+
+    /// The order of least residual between the neighbours of a line of the spectrum, by a golden section.
+    fn refined(&self, order: f64, is_friction: bool, reach: f64) -> f64 {
+        let loss = |n: f64| rss(&self.rows, n, is_friction, self.kernel_s);
+        let (mut low, mut high) = (order - reach, order + reach);
+        let inner = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+        let [mut a, mut b] = inner(low, high);
+        let (mut at_a, mut at_b) = (loss(a), loss(b));
+        for _ in 0..STEPS {
+            if at_a <= at_b {
+                (high, b, at_b) = (b, a, at_a);
+                a = inner(low, high)[0];
+                at_a = loss(a);
+            } else {
+                (low, a, at_a) = (a, b, at_b);
+                b = inner(low, high)[1];
+                at_b = loss(b);
+            }
+        }
+        0.5 * (low + high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::*;
+
+    /// 60 s of a joint at 200 rows/s with white noise of deviation 1 behind no kernel to speak of.
+    fn rows(residual: impl Fn(f64, f64) -> f64) -> CyclicRows {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut out = CyclicRows { parts: 20, kernel_s: 0.002, ..CyclicRows::default() };
+        for k in 0..12_000 {
+            let t = 0.005 * f64::from(k);
+            let q = 1.1 * (0.9 * t).sin() + 0.7 * (1.37 * t + 0.4).cos();
+            let v = 0.99 * (0.9 * t).cos() - 0.959 * (1.37 * t + 0.4).sin();
+            let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
+            out.position.push(q);
+            out.velocity.push(v);
+            out.residual.push(residual(q, v) + noise);
+            out.weight.push(1.0);
+            out.part.push(k as usize / 600);
+        }
+        out
+    }
+
+    fn found(residual: impl Fn(f64, f64) -> f64) -> Vec<CyclicFinding> {
+        find_cyclic(&rows(residual), &CyclicSettings::default())
+    }
+
+    #[test]
+    fn ripple_is_found_with_its_order_and_amplitude() {
+        let [torque] = found(|q, _| 0.6 * (50.3 * q + 0.7).sin() + 0.4)[..] else { panic!("one torque") };
+        assert!(!torque.is_friction && (torque.cycles - 50.3).abs() < 0.02, "{torque:?}");
+        assert!((torque.amplitude - 0.6).abs() < 0.05 && torque.gain > 0.1, "{torque:?}");
+        let [friction] = found(|q, v| v.signum() * 0.8 * (12.0 * q).cos())[..] else {
+            panic!("one friction")
+        };
+        assert!(friction.is_friction && (friction.cycles - 12.0).abs() < 0.02, "{friction:?}");
+    }
+
+    #[test]
+    fn both_kinds_are_found_beside_each_other() {
+        let both = found(|q, v| 0.6 * (50.3 * q).sin() + v.signum() * 0.8 * (31.0 * q).cos());
+        let kinds: Vec<bool> = both.iter().map(|f| f.is_friction).collect();
+        assert_eq!(kinds, [true, false], "the larger one first: {both:?}");
+    }
+
+    #[test]
+    fn noise_and_what_changes_slowly_are_no_ripple() {
+        assert_eq!(found(|_, _| 0.0), []);
+        assert_eq!(found(|q, _| 0.8 * (2.0 * q).sin()), [], "less than three periods over the range");
+        assert_eq!(found(|_, v| v.signum() + 0.3 * v), [], "friction that is left");
+    }
+
+    #[test]
+    fn joints_that_tell_nothing_have_no_findings() {
+        let settings = CyclicSettings::default();
+        assert_eq!(find_cyclic(&CyclicRows::default(), &settings), []);
+        let mut still = rows(|q, _| (50.0 * q).sin());
+        still.position.fill(0.3);
+        assert_eq!(find_cyclic(&still, &settings), []);
+        let mut few = rows(|q, _| (50.0 * q).sin());
+        few.part.iter_mut().for_each(|p| *p %= 4);
+        assert_eq!(find_cyclic(&few, &settings), [], "four parts of a motion");
+        let mut once = rows(|_, _| 0.0);
+        for (k, residual) in once.residual.iter_mut().enumerate() {
+            (once.position[k], once.velocity[k]) = (5e-4 * k as f64, 0.1);
+            *residual += (0.3 * k as f64).sin();
+        }
+        assert_eq!(find_cyclic(&once, &settings), [], "a vibration on a single pass");
+    }
+}
