@@ -10,7 +10,8 @@ Arms have 4 to 7 joints; friction is linear, falls from rest (Stribeck), differs
 from a simulated controller, with noise, encoder steps, delay, ripple, outliers, missing rows and a clock that jitters. The robot file that
 identification gets has other inertias than the truth: scaled and turned, or uniform links where the truth has its mass at the ends.
 The error is that of the data's README: root mean square over joints of (rms of clean true effort minus prediction at the true states, where
-|v| > 0.02 rad/s) over the rms of the true effort, on two motions that were not fitted. Needs numpy.
+|v| > 0.02 rad/s) over the rms of the true effort, on two motions that were not fitted. The true effort is what a controller must give: less the
+ripple that the drive adds. Needs numpy.
 
 `rest` adds logs in which joints stand: `singles`, one per joint that moves at three speeds while the others hold still, which `score` fits beside the
 log of all joints; and `poses`, moves of some joints from pose to pose with pauses, which it fits in place of it.
@@ -320,6 +321,8 @@ def score_one(here, dynid, settings, logs):
     if not (out / "estimate.json").exists():
         return {**about, "failed": ran.stderr[-400:]}
     estimate = json.loads((out / "estimate.json").read_text())
+    truth = json.loads((here / "truth.json").read_text())
+    ripple = truth["experiment"]["ripple"] or [(0.0, 1.0, 0.0)] * about["joints"]
     errors = {}
     for name in ("fast", "slow"):
         clean = table(here / f"{name}_clean.csv.gz")
@@ -332,15 +335,17 @@ def score_one(here, dynid, settings, logs):
         states.unlink()
         total = 0.0
         for k in range(n):
-            true = clean[f"tau_j{k + 1}"]
+            amplitude, cycles, phase = ripple[k]
+            true = clean[f"tau_j{k + 1}"] - amplitude * np.sin(cycles * rows[f"q{k + 1}"] + phase)
             moves = np.abs(rows[f"dq{k + 1}"]) > SLOWEST
             total += np.mean((true[moves] - found[moves, k]) ** 2) / np.mean(true**2)
         errors[name] = math.sqrt(total / n)
-    truth = json.loads((here / "truth.json").read_text())
     truth = truth.get("parameters", truth)
     truth = {p["name"]: p["value"] for p in truth} if isinstance(truth, list) else truth
+    for k, (amplitude, _, phase) in enumerate(ripple):
+        truth |= {f"j{k + 1}.ca": -amplitude * math.sin(phase), f"j{k + 1}.cb": -amplitude * math.cos(phase)}
     # A joint whose law is not that of the truth has other coefficients than the truth's.
-    shaped = {s["name"].split(".")[0] for s in estimate.get("shape_parameters", [])}
+    shaped = {s["name"].split(".")[0] for s in estimate.get("shape_parameters", []) if not s["name"].endswith("cycles")}
     right = {f"j{k + 1}" for k, kind in enumerate(about["kinds"]) if kind == "linear"} - shaped
     inside = seen = 0
     for p in estimate["base_parameters"]:
