@@ -20,7 +20,7 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 35] = [
+const ORDER: [&str; 36] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
@@ -49,6 +49,7 @@ const ORDER: [&str; 35] = [
     CheckName::TermsOfLogs.word(),
     FRICTION,
     KNOWN_FRICTION,
+    CYCLIC,
     BODY,
     SPRING,
     ELEMENTS,
@@ -64,6 +65,8 @@ const FINDING: &str = "finding";
 pub(crate) const FRICTION: &str = "identified friction";
 /// Known friction and its range.
 pub(crate) const KNOWN_FRICTION: &str = "known friction";
+/// Cyclic efforts that another log does not have.
+pub(crate) const CYCLIC: &str = "cyclic efforts";
 /// An identified body that could not exist.
 pub(crate) const BODY: &str = "identified body";
 /// A spring that the logs tell little of.

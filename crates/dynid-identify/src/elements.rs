@@ -10,6 +10,7 @@ mod ties;
 
 use std::sync::Arc;
 
+use dynid_friction::cyclic::CyclicFinding;
 use dynid_io::{
     CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue, SourceFile,
 };
@@ -260,6 +261,26 @@ impl ElementPlan {
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
     }
 
+    /// Adds a cyclic effort to a joint, its order the start of a search within what orders are told apart by.
+    pub(crate) fn add_cyclic(&mut self, rate: usize, joint: &str, found: &CyclicFinding) {
+        let (name, key) = cyclic_element(found.is_friction);
+        self.per_rate[rate].push(name.to_owned());
+        let number = |field: &str, value: f64| (format!("{key}.{field}"), SettingValue::Number(value));
+        let reach = 2.0 * found.resolution;
+        let settings = [
+            number("start", found.cycles),
+            number("lower", found.cycles - reach),
+            number("upper", found.cycles + reach),
+            (format!("{key}.held"), SettingValue::Flag(false)),
+        ];
+        self.spec.settings.extend(settings.map(|(key, value)| ElementSetting {
+            joint: joint.to_owned(),
+            element: name.to_owned(),
+            key,
+            value,
+        }));
+    }
+
     /// Builds the elements in joint order, then gear loads, couplings and springs, last what belongs to single logs. Where logs
     /// have a factor on friction, all friction stands after the other elements of joints.
     ///
@@ -382,6 +403,11 @@ fn candidate(registry: &ElementRegistry, kind: ShapeKind) -> Option<&Candidate> 
 pub(crate) fn shape_element(kind: ShapeKind) -> (&'static str, Option<&'static str>) {
     let registry = ElementRegistry::default();
     (kind.element(), candidate(&registry, kind).and_then(|candidate| candidate.speed))
+}
+
+/// Element of a cyclic friction or torque, and the shape parameter that is its order.
+pub(crate) fn cyclic_element(is_friction: bool) -> (&'static str, &'static str) {
+    if is_friction { ("cyclic_friction", "friction_cycles") } else { ("cyclic", "cycles") }
 }
 
 /// Kinds of shapes that say something new beside given elements. `unloaded`: no rigid effort is to be had for a gear's load.

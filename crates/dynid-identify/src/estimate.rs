@@ -35,7 +35,7 @@ use crate::settings::Route;
 use crate::tie_test::TieTest;
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FrictionProjection};
-pub use friction::{FrictionPassivity, FrictionTrial, PassivityRecord};
+pub use friction::{CyclicEffort, FrictionPassivity, FrictionTrial, PassivityRecord};
 pub use instruments::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 pub use log_fit::log_fit;
 pub(crate) use log_fit::{by_motion, pool};
@@ -447,6 +447,9 @@ pub struct ConditioningRecord {
     /// Friction shapes tried on held-out blocks.
     #[serde(default)]
     pub friction_trials: Vec<FrictionTrial>,
+    /// Efforts that repeat with the position of a joint, as the residuals of a fit without them showed. The elements of the model hold them.
+    #[serde(default)]
+    pub cyclic_efforts: Vec<CyclicEffort>,
     /// RMS of the fit's own rows, per joint.
     pub row_rms: Vec<Option<f64>>,
     /// Residual against what sensor noise explains, per joint.

@@ -215,6 +215,11 @@ impl RowResiduals {
         RowResiduals { groups: Vec::new() }
     }
 
+    /// Logs and residuals of the rows of an output.
+    pub(crate) fn of_output(&self, output: usize) -> impl Iterator<Item = (usize, &GroupResiduals)> {
+        self.groups.iter().filter(move |(_, o, _)| *o == output).map(|(log, _, rows)| (*log, rows))
+    }
+
     /// Whether raw residuals of a training log are white below the kernel's cut-off, per output; only samples near a row
     /// count.
     pub(crate) fn whiteness(

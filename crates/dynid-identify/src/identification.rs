@@ -22,6 +22,7 @@ use crate::estimate::LogFit;
 use crate::finding::Finding;
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
+use crate::joint_cyclic::JointCyclic;
 use crate::joint_stiffness::JointStiffness;
 use crate::journal_doubt::JournalSeen;
 use crate::load_rounds::LoadRounds;
@@ -78,6 +79,8 @@ pub struct Identification {
     /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none
     /// were looked for.
     pub friction: Vec<JointFriction>,
+    /// Cyclic efforts that the residuals of a first fit showed, beside the elements asked for.
+    pub cyclic: Vec<JointCyclic>,
     /// What is known about the parameters without logs.
     pub prior: Prior,
     /// The fit in the base columns.
@@ -217,7 +220,7 @@ impl Identification {
         )
     }
 
-    fn alignment(&self) -> Alignment {
+    pub(crate) fn alignment(&self) -> Alignment {
         Alignment {
             state_hz: self.state_hz,
             delay_samples: self.delay_samples,

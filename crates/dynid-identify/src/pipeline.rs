@@ -1,6 +1,7 @@
 //! The main job: from a robot file and logs to an identified model.
 
 mod alone;
+mod cyclic;
 mod effect;
 mod elastic;
 mod figures;
@@ -24,6 +25,7 @@ use dynid_rows::conditioning::{ConditioningError, ReducedGroup, tell_shared_moti
 use crate::caution::{self, Caution};
 use crate::check::CheckName;
 use crate::closed_loop::{self, Comparison, Loop};
+use crate::cyclic_doubt;
 use crate::effort_scale::{self, EffortScale};
 use crate::elements::ElementPlan;
 use crate::estimate::log_fit;
@@ -217,6 +219,7 @@ pub(crate) fn assemble(
     let ModelFit {
         conditioning,
         friction,
+        cyclic,
         shapes,
         simulations,
         residuals,
@@ -264,6 +267,7 @@ pub(crate) fn assemble(
         bounds,
         conditioning,
         friction,
+        cyclic,
         prior,
         fitted,
         consistent,
@@ -369,6 +373,15 @@ impl Identification {
         self.sources.push(log.source);
         self.warnings.extend(known::cautions(known::logged_beyond(&self.plan.known, &prepared)));
         let agreement = self.drawn_agreement(&prepared)?;
+        let doubts = cyclic_doubt::doubts(
+            self.identified_model(),
+            &prepared,
+            &self.alignment(),
+            &self.conditioning_settings,
+            &agreement,
+        )?;
+        let doubts = doubts.into_iter().map(|m| Caution::warn(caution::CYCLIC, m, cyclic_doubt::REMEDY));
+        self.warnings.extend(doubts);
         self.validation.push(agreement);
         if self.consistent.constrained() {
             let free = self.agreement(self.unconstrained_values(), &prepared)?;

@@ -1,6 +1,7 @@
 //! From an identification to its result file.
 
 mod counts;
+mod cyclic;
 mod friction;
 mod instruments;
 mod smoothing;
@@ -339,6 +340,7 @@ impl Identification {
                 c.mask_trials.iter().map(|t| (t.level, t.loss, t.standard_error, t.kept)).collect()
             }),
             friction_trials: friction::trials(self),
+            cyclic_efforts: cyclic::records(self),
             row_rms: self.row_rms.clone(),
             residual_ratio: self.residual_ratio.clone(),
         }
@@ -498,6 +500,12 @@ impl Identification {
         for (output, joint) in self.model.outputs().iter().zip(&self.friction) {
             let (shapes, reason) = friction::in_words(joint);
             add(&format!("friction shapes of {}", output.name), json!(shapes), "", Origin::Found, reason);
+        }
+        let efforts = cyclic::records(self);
+        for of_joint in efforts.chunk_by(|a, b| a.joint == b.joint) {
+            let (names, reason) = cyclic::in_words(of_joint);
+            let name = format!("cyclic efforts of {}", of_joint[0].joint);
+            add(&name, json!(names), "", Origin::Found, reason);
         }
         out
     }

@@ -2,16 +2,19 @@
 //! all that follows know of them.
 
 use dynid_estimate::separable::{
-    Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
+    Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport, fit,
 };
 use dynid_model::element::{JointElement, Linearised, change_name};
 use dynid_model::{EffortModel, LoadReference, RobotModel};
 use dynid_record::ShapeVerdict as Recorded;
-use dynid_rows::conditioning::{Conditioning, refine};
+use dynid_rows::conditioning::{Conditioning, RefineError, ShapedRows};
 
 use crate::Error;
 use crate::elements::ElementPlan;
 use crate::problem::Problem;
+
+/// Share of a shape parameter that a search stops at where little is left to find: the linearised model takes another step.
+const ROUGH_STEP: f64 = 1e-5;
 
 /// Shape parameters found from logs.
 #[derive(Debug)]
@@ -35,6 +38,9 @@ pub(crate) enum Start {
     From(Vec<f64>),
     /// From values, and from nowhere else, without a look at what the logs say about each.
     Near(Vec<f64>),
+    /// So, where a model without some of the parameters was looked at already: what logs say about the others stays, and those that it held
+    /// are held. Parameters without a finding count as seen.
+    Beside(Vec<f64>, Vec<Option<ShapeFinding>>),
 }
 
 /// Finds the shape parameters of a problem's model on its conditioned logs.
@@ -42,12 +48,16 @@ pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> 
     let Problem { model, structure, logs, settings, .. } = problem;
     let shape = match start {
         Start::Stated => model.parameters().shape_start(),
-        Start::From(values) | Start::Near(values) => values.clone(),
+        Start::From(values) | Start::Near(values) | Start::Beside(values, _) => values.clone(),
     };
     let defaults = SeparableSettings::default();
     let seed = settings.seed.unwrap_or(1);
     let separable = match start {
         Start::Near(_) => SeparableSettings { seed, starts: 1, profile_points: 0, ..defaults },
+        Start::Beside(..) => {
+            let step_tolerance = ROUGH_STEP;
+            SeparableSettings { seed, starts: 1, profile_points: 0, step_tolerance, ..defaults }
+        }
         Start::Stated | Start::From(_) => SeparableSettings {
             seed,
             search: settings.estimator.shape.search(seed)?,
@@ -56,8 +66,19 @@ pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> 
         },
     };
     let (base, conditioning) = (&structure.base, settings.conditioning_settings());
-    let found: SeparableEstimate =
-        refine(model, &shape, &base.kept, logs, choices, &conditioning, &separable)?;
+    let known: &[Option<ShapeFinding>] = if let Start::Beside(_, known) = start { known } else { &[] };
+    let held: Vec<bool> = (0..shape.len())
+        .map(|k| known.get(k).is_some_and(|k| k.as_ref().is_some_and(|k| !is_free(k))))
+        .collect();
+    let rows = ShapedRows::new(model, &shape, &base.kept, logs, choices, &conditioning)?.holding(&held);
+    let mut found: SeparableEstimate = fit(&rows, &separable).map_err(RefineError::from)?;
+    drop(rows);
+    for (finding, known) in found.findings.iter_mut().zip(known) {
+        match known {
+            Some(known) => *finding = known.clone(),
+            None => finding.verdict = ShapeVerdict::Seen,
+        }
+    }
     let mut linear = base.expanded(&found.linear);
     let fitted = model;
     fitted.complete(&mut linear);

@@ -14,13 +14,14 @@ use crate::estimate::{Estimate, Split};
 use crate::log::Log;
 use crate::logs;
 use crate::pipeline::known::logged_beyond;
+use dynid_identify::cyclic_doubt::doubts;
 
 /// Logs as predicted and as measured.
 #[derive(Debug, Clone)]
 pub struct Validation {
     /// Per log.
     pub agreements: Vec<Agreement>,
-    /// What to know about them, in words: temperatures beyond the range of known friction.
+    /// What to know about them, in words: temperatures beyond the range of known friction, cyclic efforts that a log does not have.
     pub warnings: Vec<String>,
 }
 
@@ -69,7 +70,9 @@ pub fn validate_logs(
     for log in logs {
         let prepared = log?.prepare(model, &settings)?;
         out.warnings.extend(logged_beyond(&estimate.model.known_friction, &prepared));
-        out.agreements.push(compare(model, values, &prepared, &alignment, &settings)?);
+        let agreement = compare(model, values, &prepared, &alignment, &settings)?;
+        out.warnings.extend(doubts((model, values), &prepared, &alignment, &settings, &agreement)?);
+        out.agreements.push(agreement);
     }
     Ok(out)
 }

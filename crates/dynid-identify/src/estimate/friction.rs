@@ -20,6 +20,25 @@ pub struct FrictionTrial {
     pub accepted: bool,
 }
 
+/// An effort that repeats with the position of a joint, `w (A cos nq + B sin nq)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CyclicEffort {
+    /// Joint.
+    pub joint: String,
+    /// Element that it became: `cyclic`, a torque (`w` is 1), or `cyclic_friction` (`w` is the sign of the velocity).
+    pub element: String,
+    /// Repetitions `n` per turn; of a joint that slides, per `2π` metres.
+    pub cycles: f64,
+    /// Amplitude `√(A² + B²)`.
+    pub amplitude: f64,
+    /// Unit of the amplitude.
+    pub unit: String,
+    /// Share by which the joint's mean square residual falls on held-out parts of the motion.
+    pub gain: f64,
+    /// Standard error of the gain over these parts.
+    pub standard_error: f64,
+}
+
 dynid_record::words! {
     /// Where the friction of a joint takes energy out of the motion.
     FrictionPassivity {

@@ -10,6 +10,7 @@ use crate::Error;
 use crate::elements::LoadValues;
 use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
+use crate::shape::Start;
 
 /// Change below which a round looks at all that logs say.
 const NEAR: f64 = 1e-3;
@@ -51,7 +52,8 @@ pub(crate) fn settle(
         problem.plan.load_values = Some(LoadValues::of(&model, &linear, true));
         problem.rebuild()?;
         let shape = model.parameters().shape_start();
-        let before = Before::Found { friction: std::mem::take(&mut fit.friction), shape, roughly: !near };
+        let start = if near { Start::From(shape) } else { Start::Near(shape) };
+        let before = Before::Found { friction: std::mem::take(&mut fit.friction), start };
         (problem, fit) = problem.fit_at_loads(fit.conditioning.take(), before, progress)?;
         out.rounds += 1;
     }
@@ -79,9 +81,23 @@ impl Problem {
         conditioning: Option<Conditioning>,
         progress: &mut dyn FnMut(Step),
     ) -> Result<(Problem, ModelFit), Error> {
+        let (problem, fit) = self.fit_from(conditioning, Before::Nothing, progress)?;
+        problem.fit_cyclic(fit, progress)
+    }
+
+    /// The same from what is known of shapes before, without a look for cyclic efforts.
+    ///
+    /// # Errors
+    /// As [`Problem::fit`].
+    pub(super) fn fit_from(
+        self,
+        conditioning: Option<Conditioning>,
+        before: Before,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<(Problem, ModelFit), Error> {
         match self.plan.follows_loads() {
-            false => self.fit_at_loads(conditioning, Before::Nothing, progress),
-            true => settle(self, conditioning, Before::Nothing, progress),
+            false => self.fit_at_loads(conditioning, before, progress),
+            true => settle(self, conditioning, before, progress),
         }
     }
 

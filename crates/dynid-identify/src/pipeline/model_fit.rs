@@ -10,6 +10,7 @@ use crate::closed_loop::{self, Loop, LoopFit, LoopRun};
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::friction_power::{self, FrictionPower};
+use crate::joint_cyclic::JointCyclic;
 use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
 use crate::settings::Settings;
@@ -22,6 +23,8 @@ pub struct ModelFit {
     pub conditioning: Option<Conditioning>,
     /// Shapes of friction per output.
     pub friction: Vec<JointFriction>,
+    /// Cyclic efforts that joints took.
+    pub cyclic: Vec<JointCyclic>,
     /// Shape parameters as found.
     pub shapes: Option<ShapeFit>,
     /// How the simulations went, for estimators that simulate the closed loop.
@@ -86,6 +89,7 @@ impl Problem {
         let fit = ModelFit {
             conditioning,
             friction,
+            cyclic: Vec::new(),
             shapes,
             simulations: run,
             residuals: measured,

@@ -26,15 +26,12 @@ pub(super) enum Before {
     Nothing,
     /// Friction stays as the plan states it; shape parameters are searched.
     AsStated,
-    /// What a fit found with other loads: shapes of friction, and values of shape parameters that a search starts from. `roughly`: by one
-    /// start, without what logs say about each.
+    /// What a fit found with other loads or fewer elements: shapes of friction, and where the search of shape parameters starts.
     Found {
         /// Shapes of friction.
         friction: Vec<JointFriction>,
-        /// Values of shape parameters.
-        shape: Vec<f64>,
-        /// No more than the values.
-        roughly: bool,
+        /// Start of the search.
+        start: Start,
     },
 }
 
@@ -52,9 +49,9 @@ pub(super) fn search(
     let mut out = Shaped { conditioning, friction: Vec::new(), found: None };
     let choose = matches!(before, Before::Nothing);
     let mut start = Start::Stated;
-    if let Before::Found { friction, shape, roughly } = before {
+    if let Before::Found { friction, start: from } = before {
         out.friction = friction;
-        start = if roughly { Start::Near(shape) } else { Start::From(shape) };
+        start = from;
     }
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
     let all_known = problem.plan.known.len() == problem.plan.per_rate.len();

@@ -53,6 +53,7 @@ impl Reduction {
         let fit = ModelFit {
             conditioning: Some(self.recipe.conditioning(&rates)),
             friction: Vec::new(),
+            cyclic: Vec::new(),
             shapes,
             simulations: None,
             residuals: RowResiduals::none(),

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Friction {
-    /// The elements of the robot file or the configuration, and shapes that held-out blocks ask for.
+    /// The elements of the robot file or the configuration, and beside them what held-out stretches of the logs ask for: shapes of friction, and
+    /// efforts that repeat with the position of a joint.
     #[default]
     Auto,
     /// The elements of the robot file or the configuration, nothing else.

@@ -116,6 +116,21 @@ impl<'a> ShapedRows<'a> {
     }
 }
 
+impl ShapedRows<'_> {
+    /// Returns the rows with some shape parameters held at their start.
+    ///
+    /// # Panics
+    /// If there is not one flag per shape parameter.
+    #[must_use]
+    pub fn holding(mut self, held: &[bool]) -> Self {
+        assert_eq!(held.len(), self.parameters.len(), "flags of shape parameters");
+        for (parameter, _) in self.parameters.iter_mut().zip(held).filter(|(_, held)| **held) {
+            (parameter.lower, parameter.upper) = (parameter.start, parameter.start);
+        }
+        self
+    }
+}
+
 /// What a stretch of a log holds of a group's rows.
 struct Part {
     /// Rows of the group whose windows reach into the stretch.

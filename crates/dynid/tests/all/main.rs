@@ -10,6 +10,7 @@ mod closed_experiments;
 mod closed_robots;
 mod column_order;
 mod compare;
+mod cyclic;
 mod design;
 mod elastic;
 mod elements;

@@ -23,8 +23,9 @@ fn check(
         |joint: &JointFriction| joint.accepted.iter().filter(|t| t.shape.kind != ShapeKind::Power).count();
     let shaped: usize = id.friction.iter().map(adds).sum();
     let table = &id.model.parameters().linear;
+    let cyclic = 2 * id.cyclic.len();
     let searched = id.base.kept.iter().filter(|c| table[**c].name.ends_with("(change)")).count();
-    assert_eq!(id.base.len(), parameters + shaped + searched, "{name}: base parameters");
+    assert_eq!(id.base.len(), parameters + shaped + cyclic + searched, "{name}: base parameters");
     let agreement = on_validation(&config, &id, filter_hz);
     let ratio = |fit| geometric_mean(rms(fit).iter().zip(baseline).map(|(r, b)| r / b));
     let (plain, aligned) = (ratio(&agreement.filtered_unaligned), ratio(&agreement.filtered));
@@ -44,6 +45,17 @@ fn check(
                 output.name, taken.shape.value
             );
         }
+    }
+    for joint in &id.cyclic {
+        let (found, name) = (&joint.found, &id.model.outputs()[joint.output].name);
+        let kind = if found.is_friction { "friction" } else { "torque" };
+        println!(
+            "  {name}: cyclic {kind}, {:.2} a turn, {:.3}, held-out mean square falls by {:.0} ± {:.0} %",
+            found.cycles,
+            found.amplitude,
+            100.0 * found.gain,
+            100.0 * found.standard_error
+        );
     }
     assert!(plain <= limit, "{name}: {plain} above {limit}");
     Some(id)

@@ -224,9 +224,14 @@ fn identified(path: &Path, text: &str) -> Vec<(f64, f64)> {
         file.display().to_string()
     );
     let id = identify(&Config::parse(&run, "test").unwrap(), &mut |_| {}).unwrap();
-    let beta = id.base.values(&values(&log));
-    let std = id.standard_deviations();
-    (0..beta.len()).filter_map(|k| std[k].0.map(|s| (id.fit().x[k] - beta[k], s))).collect()
+    let table = &id.model.parameters().linear;
+    let truth = |name: &str| log.truth.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+    let values: Vec<f64> = table.iter().map(|p| truth(&p.name).unwrap_or(0.0)).collect();
+    let (beta, std) = (id.base.values(&values), id.standard_deviations());
+    // What the logs have beside the truth's parameters, ripple, has no entry there.
+    let of_truth = |k: &usize| truth(&table[id.base.kept[*k]].name).is_some();
+    let known = (0..beta.len()).filter(of_truth);
+    known.filter_map(|k| std[k].0.map(|s| (id.fit().x[k] - beta[k], s))).collect()
 }
 
 /// Mean of `|error| / predicted`, and its largest.
