@@ -10,13 +10,20 @@ const COLUMNS: usize = 2 + BESIDE;
 /// Keeps normal equations solvable where the motion does not tell columns apart, in parts of their diagonal.
 const RIDGE: f64 = 1e-9;
 
+/// Share by which squares fall on held-out parts, and its standard error over parts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gain {
+    pub(super) share: f64,
+    pub(super) error: f64,
+}
+
 /// An order on held-out parts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Score {
-    /// Mean over parts of the logarithm by which the mean square residual falls.
-    pub(super) mean: f64,
-    /// Its standard error.
-    pub(super) error: f64,
+    /// Of the mean square, all parts alike (mean of logarithms): an order that is there shows in most parts.
+    pub(super) of_parts: Gain,
+    /// Of the sum of squares of all parts: a few slow parts, where the kernel leaves more of a ripple, may tell all.
+    pub(super) of_sum: Gain,
     /// `A`, `B` of all parts.
     pub(super) coefficients: [f64; 2],
 }
@@ -80,21 +87,36 @@ fn per_part(rows: &[Row], parts: usize, n: f64, is_friction: bool, kernel_s: f64
 /// Fits an order without each part and judges it there; `None` where no part can be judged.
 pub(super) fn score(rows: &[Row], parts: usize, n: f64, is_friction: bool, kernel_s: f64) -> Option<Score> {
     let (sums, all) = per_part(rows, parts, n, is_friction, kernel_s);
-    let gain = |part: &Sums| {
+    let squares = |part: &Sums| {
         let others = all.less(part);
         let (without, with) = (part.rss(&others.solve(2)?), part.rss(&others.solve(0)?));
-        (without > 0.0 && with > 0.0).then(|| (without / with).ln())
+        (without > 0.0 && with > 0.0).then_some((without, with))
     };
     // Parts without rows say nothing.
-    let gains: Vec<f64> = sums.iter().filter(|part| part.0[2][2] > 0.0).filter_map(gain).collect();
-    let count = gains.len() as f64;
-    if count < 2.0 {
+    let pairs: Vec<(f64, f64)> = sums.iter().filter(|part| part.0[2][2] > 0.0).filter_map(squares).collect();
+    if pairs.len() < 2 {
         return None;
     }
+    let [a, b, ..] = all.solve(0)?;
+    Some(Score { of_parts: of_parts(&pairs), of_sum: of_sum(&pairs), coefficients: [a, b] })
+}
+
+fn of_parts(pairs: &[(f64, f64)]) -> Gain {
+    let gains: Vec<f64> = pairs.iter().map(|(without, with)| (without / with).ln()).collect();
+    let count = gains.len() as f64;
     let mean = gains.iter().sum::<f64>() / count;
     let square: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
-    let [a, b, ..] = all.solve(0)?;
-    Some(Score { mean, error: (square / (count - 1.0) / count).sqrt(), coefficients: [a, b] })
+    let left = (-mean).exp();
+    Gain { share: 1.0 - left, error: left * (square / (count - 1.0) / count).sqrt() }
+}
+
+fn of_sum(pairs: &[(f64, f64)]) -> Gain {
+    let count = pairs.len() as f64;
+    let total: f64 = pairs.iter().map(|(without, _)| without).sum();
+    let share = 1.0 - pairs.iter().map(|(_, with)| with).sum::<f64>() / total;
+    // The error of a ratio of sums.
+    let square: f64 = pairs.iter().map(|(without, with)| (without - with - share * without).powi(2)).sum();
+    Gain { share, error: (count / (count - 1.0) * square).sqrt() / total }
 }
 
 /// Weighted residual sum of squares of the fit of an order to all rows.

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::Row;
-use super::score::{Score, rss, score, without_friction, without_order};
+use super::score::{Gain, Score, rss, score, without_friction, without_order};
 use super::spectrum::spectrum;
 
 /// Rows of one joint's residuals behind a Gaussian kernel.
@@ -34,8 +34,10 @@ pub struct CyclicSettings {
     pub least_periods: f64,
     /// Standard errors that the gain on held-out parts must be of: so many that hundreds of orders which are tried do not pass by chance. Default 3.
     pub sigmas: f64,
-    /// Share of the mean square residual that must be gone on held-out parts. Default 0.03.
+    /// Share of the mean square residual that must be gone on held-out parts, all parts alike. Default 0.03.
     pub least_gain: f64,
+    /// Or share of the sum of squares of all parts, in which a few may tell all. Default 0.1.
+    pub least_gain_of_sum: f64,
     /// Fewest parts that hold rows. Default 8.
     pub least_parts: usize,
     /// Fewest passes of the joint, from turn to turn. On a single one a vibration, which repeats in time, looks like ripple; a place that is passed
@@ -45,7 +47,14 @@ pub struct CyclicSettings {
 
 impl Default for CyclicSettings {
     fn default() -> Self {
-        CyclicSettings { least_periods: 3.0, sigmas: 3.0, least_gain: 0.03, least_parts: 8, least_passes: 4 }
+        CyclicSettings {
+            least_periods: 3.0,
+            sigmas: 3.0,
+            least_gain: 0.03,
+            least_gain_of_sum: 0.1,
+            least_parts: 8,
+            least_passes: 4,
+        }
     }
 }
 
@@ -60,7 +69,7 @@ pub struct CyclicFinding {
     pub resolution: f64,
     /// Amplitude `√(A² + B²)`, N m or N.
     pub amplitude: f64,
-    /// Share by which the mean square residual falls on held-out parts.
+    /// Share by which the mean square residual falls on held-out parts, all parts alike; where a few told all, the sum of squares.
     pub gain: f64,
     /// Standard error of the gain over parts.
     pub standard_error: f64,
@@ -151,7 +160,7 @@ impl<'a> Search<'a> {
     fn next(&mut self, kinds: &[bool]) -> Option<CyclicFinding> {
         let lines = spectrum(&self.rows, self.kernel_s, self.range, self.orders);
         let resolution = PI / (2.0 * (self.range.1 - self.range.0));
-        let mut best: Option<(bool, f64, Score)> = None;
+        let mut best: Option<(bool, f64, Gain, [f64; 2])> = None;
         for is_friction in kinds {
             let share = |k: usize| lines[k].shares[usize::from(*is_friction)];
             let worth = NEAR * self.settings.least_gain;
@@ -164,34 +173,32 @@ impl<'a> Search<'a> {
             peaks.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
             for k in peaks.into_iter().take(TRIED) {
                 let judged = |n: f64| score(&self.rows, self.parts, n, *is_friction, self.kernel_s);
-                if judged(lines[k].order).is_none_or(|found| !self.passes(&found, NEAR)) {
+                if judged(lines[k].order).and_then(|found| self.passes(&found, NEAR)).is_none() {
                     continue;
                 }
                 let cycles = self.refined(lines[k].order, *is_friction, resolution);
-                let Some(found) = judged(cycles).filter(|found| self.passes(found, 1.0)) else { continue };
-                if best.is_none_or(|(.., other)| found.mean > other.mean) {
-                    best = Some((*is_friction, cycles, found));
+                let Some(found) = judged(cycles) else { continue };
+                let Some(gain) = self.passes(&found, 1.0) else { continue };
+                if best.is_none_or(|(_, _, other, _)| gain.share > other.share) {
+                    best = Some((*is_friction, cycles, gain, found.coefficients));
                 }
             }
         }
-        let (is_friction, cycles, found) = best?;
-        without_order(&mut self.rows, cycles, is_friction, found.coefficients, self.kernel_s);
-        let [a, b] = found.coefficients;
-        let left = (-found.mean).exp();
-        Some(CyclicFinding {
-            is_friction,
-            cycles,
-            resolution,
-            amplitude: a.hypot(b),
-            gain: 1.0 - left,
-            standard_error: left * found.error,
-        })
+        let (is_friction, cycles, gain, coefficients) = best?;
+        without_order(&mut self.rows, cycles, is_friction, coefficients, self.kernel_s);
+        let [a, b] = coefficients;
+        let amplitude = a.hypot(b);
+        let (gain, standard_error) = (gain.share, gain.error);
+        Some(CyclicFinding { is_friction, cycles, resolution, amplitude, gain, standard_error })
     }
 
-    /// Whether an order gains enough; `share`: of what is asked for.
-    fn passes(&self, found: &Score, share: f64) -> bool {
-        let least = -(1.0 - self.settings.least_gain).ln();
-        found.mean >= share * least && found.mean > share * self.settings.sigmas * found.error
+    /// What an order gains, if it is enough; `part`: of what is asked for.
+    fn passes(&self, found: &Score, part: f64) -> Option<Gain> {
+        let CyclicSettings { sigmas, least_gain, least_gain_of_sum, .. } = self.settings;
+        let enough =
+            |gain: &Gain, least: f64| gain.share >= part * least && gain.share > part * sigmas * gain.error;
+        let either = [(found.of_parts, *least_gain), (found.of_sum, *least_gain_of_sum)];
+        either.into_iter().find(|(gain, least)| enough(gain, *least)).map(|(gain, _)| gain)
     }
 
     /// The order of least residual between the neighbours of a line of the spectrum, by a golden section.
