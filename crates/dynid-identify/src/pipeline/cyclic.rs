@@ -4,7 +4,7 @@ use dynid_estimate::separable::ShapeFinding;
 use dynid_friction::cyclic::{CyclicFinding, CyclicRows, CyclicSettings, find_cyclic};
 use dynid_model::{EffortModel, ShapeParameter};
 use dynid_motion::Kernel;
-use dynid_rows::conditioning::{Conditioning, PreparedLog, motions, parts_of_motions};
+use dynid_rows::conditioning::{Conditioning, LogMotion, PreparedLog, motions, parts_of_motions};
 use rayon::prelude::*;
 
 use super::Step;
@@ -93,28 +93,38 @@ fn find(problem: &Problem, fit: &ModelFit, choices: &Conditioning) -> Vec<JointC
 
 /// Which part of the motion a sample lies in: the same places of a motion that repeats are one part.
 struct Parts {
-    /// Per log and block of time.
-    of_block: Vec<Vec<usize>>,
+    /// Per log: length of its blocks, samples, and the part that each block is.
+    of_log: Vec<(f64, Vec<usize>)>,
     count: usize,
 }
 
 impl Parts {
     fn of(logs: &[PreparedLog]) -> Self {
-        let motions = motions(logs);
-        let seconds: f64 = logs.iter().map(PreparedLog::duration).sum();
-        let blocks = logs.iter().zip(&motions).map(|(log, motion)| {
-            let period = motion.repeats_after.map_or(f64::INFINITY, |samples| samples / log.rate_hz);
-            let block = (seconds / PARTS).min(2.0 * period / PARTS);
-            (log.duration() / block).round().max(1.0) as usize
-        });
-        let of_block = parts_of_motions(&motions, &blocks.collect::<Vec<_>>());
-        let count = of_block.iter().flatten().max().map_or(0, |part| part + 1);
-        Parts { of_block, count }
+        let rates: Vec<f64> = logs.iter().map(|log| log.rate_hz).collect();
+        Self::of_motions(&motions(logs), &rates)
     }
 
-    fn at(&self, log: usize, sample: usize, samples: usize) -> usize {
-        let blocks = &self.of_block[log];
-        blocks[(sample * blocks.len() / samples.max(1)).min(blocks.len() - 1)]
+    /// `motions`: in samples; `rates`: of the logs, Hz.
+    fn of_motions(motions: &[LogMotion], rates: &[f64]) -> Self {
+        let of_logs = || motions.iter().zip(rates);
+        let seconds: f64 = of_logs().map(|(motion, rate)| motion.length / rate).sum();
+        let blocks: Vec<usize> = of_logs()
+            .map(|(motion, rate)| {
+                let period = motion.repeats_after.map_or(f64::INFINITY, |samples| samples / rate);
+                let block = (seconds / PARTS).min(2.0 * period / PARTS);
+                (motion.length / rate / block).round().max(1.0) as usize
+            })
+            .collect();
+        let of_block = parts_of_motions(motions, &blocks);
+        let count = of_block.iter().flatten().max().map_or(0, |part| part + 1);
+        // A period is a whole number of blocks, so that blocks of a log need not add up to it: the last takes the rest.
+        let lengths = motions.iter().zip(&blocks).map(|(motion, blocks)| motion.parts(*blocks).1);
+        Parts { of_log: lengths.zip(of_block).collect(), count }
+    }
+
+    fn at(&self, log: usize, sample: usize) -> usize {
+        let (length, parts) = &self.of_log[log];
+        parts[((sample as f64 / length) as usize).min(parts.len() - 1)]
     }
 }
 
@@ -142,8 +152,29 @@ fn rows(output: usize, fit: &ModelFit, logs: &[PreparedLog], parts: &Parts, kern
             out.velocity.push((position[last] - position[first]) / seconds);
             out.residual.push(*residual);
             out.weight.push(weight);
-            out.part.push(parts.at(log, *sample, samples));
+            out.part.push(parts.at(log, *sample));
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_place_of_every_period_is_in_the_same_part() {
+        // 4.66 periods: no whole number of blocks.
+        let motion = LogMotion { length: 23_300.0, repeats_after: Some(5_000.0), first: 0, lag: 0.0 };
+        let parts = Parts::of_motions(&[motion], &[1000.0]);
+        assert!(parts.count >= 10, "{}", parts.count);
+        for place in (50..5_000).step_by(100) {
+            for later in [5_000, 10_000, 15_000] {
+                assert_eq!(parts.at(0, place), parts.at(0, place + later), "{place} and {later} later");
+            }
+        }
+        let once = LogMotion { repeats_after: None, ..motion };
+        let parts = Parts::of_motions(&[once], &[1000.0]);
+        assert_eq!((parts.at(0, 0), parts.at(0, 12_000), parts.at(0, 23_299)), (0, 10, 19));
+    }
 }

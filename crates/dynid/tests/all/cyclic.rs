@@ -8,23 +8,7 @@ use dynid::estimate::Estimate;
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Robot, RobotOptions, identify};
 
-use crate::support::write_log;
-
-const ARM: &str = r#"schema = 1
-name = "arm"
-dh = "modified"
-[[joint]]
-name = "j1"
-alpha = "-90deg"
-d = 0.3
-limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
-phi = [3.0, 0.6, 0.03, 0.0, 0.06, -0.006, 0.0, 0.17, 0.0, 0.18]
-[[joint]]
-name = "j2"
-a = 0.35
-limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
-phi = [1.5, 0.225, 0.01, 0.0, 0.03, -0.0015, 0.0, 0.06, 0.0, 0.06]
-"#;
+use crate::support::{ARM, write_log};
 
 /// A motor that cogs 63 times a turn of its joint, and a gear of ratio 22.5 whose friction changes once a turn of its motor.
 const TRUTH: &str = r#"[element.j1]

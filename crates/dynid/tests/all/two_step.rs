@@ -18,21 +18,7 @@ use dynid::{Config, Error, Robot, RobotOptions, identify};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-const ARM: &str = r#"schema = 1
-name = "arm"
-dh = "modified"
-[[joint]]
-name = "j1"
-alpha = "-90deg"
-d = 0.3
-limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
-phi = [3.0, 0.6, 0.03, 0.0, 0.06, -0.006, 0.0, 0.17, 0.0, 0.18]
-[[joint]]
-name = "j2"
-a = 0.35
-limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
-phi = [1.5, 0.225, 0.01, 0.0, 0.03, -0.0015, 0.0, 0.06, 0.0, 0.06]
-"#;
+use crate::support::ARM;
 
 /// Friction of both joints: it falls from rest, saturates with speed and falls by 1.2 % of its amplitude per kelvin.
 const FRICTION: &str = r#"stribeck = { coulomb = 2.0, static = 2.8, vs = 0.1 }
@@ -449,7 +435,8 @@ fn bristles_are_remembered_through_a_record() {
             joint
         });
         std::fs::write(bench.path("friction.json"), friction_file(&joints)).unwrap();
-        bench.identify(KNOWN, LOG).1
+        // Ripple, which the logs have, would join one fit and not the other.
+        bench.identify(&format!("{KNOWN}\nfriction = \"given\""), LOG).1
     };
     let stiff = with(json!({ "sigma0": 1e6, "sigma1": 1.0 }));
     let (steady, soft) = (with(Value::Null), with(json!({ "sigma0": 20.0, "sigma1": 1.0 })));
@@ -457,7 +444,6 @@ fn bristles_are_remembered_through_a_record() {
     println!("{} % stiff, {} % steady, {} % soft", error(&stiff), error(&steady), error(&soft));
     // The true friction has no bristles. Stiff ones differ by the sample that they turn late (the velocity is held over a
     // step); soft ones, which bend by a tenth of a radian, spoil the fit.
-    let more = (error(&stiff).powi(2) - error(&steady).powi(2)).sqrt();
-    assert!(more < 0.2 * error(&soft), "{more} % more");
+    assert!(error(&stiff) < 1.5 * error(&steady));
     assert!(error(&soft) > 3.0 * error(&steady));
 }

@@ -13,6 +13,23 @@ use dynid::simulate::SimulatedLog;
 use dynid::trust::ParameterTrust;
 use dynid::{Identification, Run, identify};
 
+/// An arm of two joints without elements.
+pub(crate) const ARM: &str = r#"schema = 1
+name = "arm"
+dh = "modified"
+[[joint]]
+name = "j1"
+alpha = "-90deg"
+d = 0.3
+limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
+phi = [3.0, 0.6, 0.03, 0.0, 0.06, -0.006, 0.0, 0.17, 0.0, 0.18]
+[[joint]]
+name = "j2"
+a = 0.35
+limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
+phi = [1.5, 0.225, 0.01, 0.0, 0.03, -0.0015, 0.0, 0.06, 0.0, 0.06]
+"#;
+
 /// Panda with torque sensors, later 30 % kept back.
 pub(crate) const PANDA: &str = r#"
 robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
