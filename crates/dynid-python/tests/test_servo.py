@@ -138,8 +138,10 @@ ARM = """<robot name="arm">
 """
 
 
-def moved(mujoco: Any, command: np.ndarray[Any, Any], period: float) -> np.ndarray[Any, Any]:
-    """What encoders read of the true arm in MuJoCo, by Runge-Kutta steps and dry friction that hardly gives way."""
+def moved(
+    mujoco: Any, command: np.ndarray[Any, Any], period: float, efforts: list[np.ndarray[Any, Any]] | None = None
+) -> np.ndarray[Any, Any]:
+    """What encoders read of the true arm in MuJoCo, by Runge-Kutta steps and dry friction that hardly gives way; `efforts` takes those of the drives."""
     text = arm({joint: values[2:] for joint, values in TRUTH.items()})
     text = text.replace('timestep="0.0005" integrator="implicitfast"', 'timestep="0.0001" integrator="RK4"')
     text = text.replace('solreffriction="0.001 1"', 'solreffriction="0.0004 1" solimpfriction="0.9999 0.9999 0.001"')
@@ -156,6 +158,9 @@ def moved(mujoco: Any, command: np.ndarray[Any, Any], period: float) -> np.ndarr
         if k % ticks == 0:
             rows.append(np.round(data.qpos / STEP) * STEP)
         data.ctrl[:] = command[max(0, k - late) // ticks]
+        if efforts is not None and k % ticks == 0:
+            mujoco.mj_forward(model, data)
+            efforts.append(data.qfrc_actuator.copy())
         mujoco.mj_step(model, data)
     return np.array(rows)
 
@@ -212,6 +217,24 @@ def test_arrays_give_drives_and_drives_the_next_motion(tmp_path: Path) -> None:
     found = errors(second)
     assert np.exp(np.mean(np.log([max(x, 1e-5) for x in found.values()]))) < 0.005, found
     assert second.record["validation"][0]["rms"][0] < 1e-3
+
+    # Beside positions the drives' efforts in one log and their currents in another; no velocity gain is known.
+    efforts: list[np.ndarray[Any, Any]] = []
+    q = moved(mujoco, command, PERIOD, efforts)
+    noise = np.random.default_rng(0).normal(size=(2, *q.shape))
+    with_tau = dynid.CommandLog(t, command, q, tau=np.array(efforts) + 0.1 * noise[0])
+    with_current = dynid.CommandLog(t, command, q, current=np.array(efforts) / 2 + 0.05 * noise[1])
+    logs = [with_tau, with_current, log]
+    measured = dynid.servo(robot, logs, gains="own")
+    said = {(e["channel"], e["joint"]): e["verdict"] for e in measured.record["fit"]["efforts"]}
+    assert said == {(c, j): "taken" for c in ("effort", "current") for j in TRUTH}, said
+    value = {(p["term"], p["joints"]): p["value"] for p in measured.parameters.rows()}
+    for joint, values in TRUTH.items():
+        assert abs(value["position_gain", joint] / values[0] - 1) < 0.02, value
+        assert abs(value["velocity_gain", joint] / values[1] - 1) < 0.02, value
+        assert abs(value["torque_constant", joint] / 2 - 1) < 0.02, value
+    alone = dynid.servo(robot, logs[0], gains="own", fit=[])
+    assert alone.record["fit"]["efforts"] == []
 
     with pytest.raises(dynid.SettingError):
         dynid.servo(robot, log, position_gan=3)

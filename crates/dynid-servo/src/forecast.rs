@@ -3,6 +3,7 @@
 use dynid_linalg::Mat;
 
 use crate::chain::Chain;
+use crate::channel::Channel;
 use crate::fit::{Evaluation, ServoProblem, blocks, with_priors};
 use crate::free::{Free, ServoValues};
 use crate::identify::{ServoGroup, groups};
@@ -46,7 +47,8 @@ pub fn forecast(
     let log = ServoLog { start: Some(first), ..log.clone() };
     let logs = std::slice::from_ref(&log);
     let whole = blocks(logs, 1);
-    let problem = ServoProblem { chains, logs, scheme, free, blocks: &whole };
+    let channels = &[Channel::Position];
+    let problem = ServoProblem { chains, logs, scheme, free, channels, blocks: &whole };
     let evaluation = Evaluation::new(&problem, values, sigma, true)?;
     let estimate = values.gather(free);
     let information = with_priors(evaluation.normal(&|_| true), free, &estimate).0;

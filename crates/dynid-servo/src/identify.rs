@@ -2,12 +2,18 @@
 //!
 //! 1. [Linear start](crate::start), then [output error](crate::fit) of the plain law: rotor inertia, viscous and Coulomb friction,
 //!    delay, and position gains where they are not known.
-//! 2. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
-//! 3. The step of the simulation is halved until it does not matter.
-//! 4. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
+//! 2. Readings that stand out alone of what that misses are left out.
+//! 3. Efforts and currents that were measured, as far as they are those of the drives that the positions tell: they join the sum of squares, each
+//!    weighted by its own noise.
+//! 4. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
+//! 5. The step of the simulation is halved until it does not matter. Where nothing but rounding is left, encoders that stand still count less, row by
+//!    row, and the step is halved once more.
+//! 6. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
 //!    other gains ([`Spread`]). Where the model is wrong these decide.
-//! 5. Verdicts and groups of parameters that only act together.
+//! 7. Verdicts and groups of parameters that only act together.
 
+mod efforts;
+mod outliers;
 mod result;
 mod verdict;
 
@@ -16,17 +22,19 @@ use std::collections::BTreeSet;
 use dynid_model::Mechanism;
 
 use crate::chain::Chain;
-use crate::fit::{Block, Evaluation, Fitted, GaussNewton, ServoProblem, blocks, deviations, fit};
+use crate::channel::{Channel, EffortAt};
+use crate::fit::{Block, Evaluation, Fitted, GaussNewton, ServoProblem, blocks, deviations, fit, readings};
 use crate::free::{Free, ServoValues};
-use crate::joint::Scheme;
+use crate::joint::{Hold, Scheme};
 use crate::log::ServoLog;
+use crate::measured::Measured;
 use crate::rollout::Lost;
 use crate::settings::{Addition, Choice, ServoSettings};
 use crate::start::{StartSettings, linear_start};
 use crate::term::Term;
 pub use result::{
-    AdditionTrial, DirectionTrial, GroupKind, HorizonError, ServoError, ServoGroup, ServoIdentification,
-    ServoParameter, ServoVerdict, Spread, TOLD_DIRECTION,
+    AdditionTrial, DirectionTrial, EffortUse, EffortVerdict, GroupKind, HorizonError, Outliers, ServoError,
+    ServoGroup, ServoIdentification, ServoParameter, ServoVerdict, Spread, TOLD_DIRECTION,
 };
 pub(crate) use verdict::groups;
 use verdict::parameters;
@@ -52,13 +60,28 @@ const OF_FOLDS: GaussNewton = GaussNewton { evaluations: 4, tolerance: 1e-3, rew
 /// Residual over the encoder's rounding from which the model counts as wrong.
 pub const MISFIT: f64 = 1.3;
 
+/// Time from which an encoder that stands still says less with every row, s: a joint at 0.03 rad/s moves by two steps of an encoder of 12 bits.
+const STILL_S: f64 = 0.1;
+
+/// Share of a period that stands for an instant.
+const INSTANT: f64 = 0.05;
+
+/// Relative difference of losses up to which two readings of the efforts are met alike.
+const ALIKE: f64 = 0.01;
+
+/// Relative half width of an interval up to which a scale is no open one.
+const SETTLED_SCALE: f64 = 0.1;
+
+/// Relative half width of an interval from which a scale that moves all its members together is moved by the least error of the model, too.
+const OPEN_SCALE: f64 = 0.02;
+
 /// Rows that a log needs at least.
 pub const LEAST_ROWS: usize = 50;
 
 /// Sweeps over the joints whose directions are looked for.
 const SWEEPS: usize = 3;
 
-/// Identifies a robot on a fixed base from commands and positions.
+/// Identifies a robot on a fixed base from commands and positions, and efforts or currents where logs have them.
 ///
 /// # Errors
 /// [`ServoError`].
@@ -84,8 +107,13 @@ pub fn identify(
     let period = logs.iter().map(ServoLog::period).fold(0.0_f64, f64::max);
     let mut work = Work {
         chains: &chains,
-        logs,
+        logs: logs.to_vec(),
         settings,
+        channels: vec![Channel::Position],
+        measured: Measured::none(settings.joints.len()),
+        efforts: Vec::new(),
+        outliers: Vec::new(),
+        by_span: Vec::new(),
         blocks: blocks(logs, settings.blocks),
         // A clock that jitters a little is no reason for another step.
         scheme: Scheme {
@@ -94,11 +122,13 @@ pub fn identify(
             middle: true,
             load: settings.load,
             hold: settings.hold,
+            effort_at: settings.effort_at,
+            effort_span_s: period,
         },
         evaluations: 0,
     };
     let own_gains = settings.own_gains.then_some(Addition::OwnGains);
-    let plain = settings.free(&chains, &own_gains.into_iter().collect());
+    let plain = settings.free(&chains, &own_gains.into_iter().collect(), &work.measured);
     let mut laws: BTreeSet<Addition> = match &settings.choice {
         Choice::HeldOut => BTreeSet::new(),
         Choice::Given(given) => given.iter().copied().collect(),
@@ -109,13 +139,24 @@ pub fn identify(
     let directions = work.directions(&mut known, &plain, &laws)?;
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
-    let free = settings.free(&chains, &laws);
+    let mut free = work.free(&laws);
     let mut fitted = work.first_fit(&free, begin, &GaussNewton::default())?;
+    if work.leave_out(&fitted, 0)? {
+        fitted = work.refit(&free, &fitted.values, work.scheme, &GaussNewton::default())?;
+    }
+    work.take_channels(&free, &mut fitted)?;
+    if work.channels.len() > 1 {
+        free = work.free(&laws);
+        fitted = work.fit_channels(&free, &fitted.values)?;
+        if work.leave_out(&fitted, 1)? {
+            fitted = work.refit(&free, &fitted.values, work.scheme, &GaussNewton::default())?;
+        }
+    }
     let mut trials = Vec::new();
     let mut richer = Vec::new();
     // One measure of all laws: by joint the residual of the first.
     let sigma: Vec<f64> =
-        fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
+        fitted.evaluation.variances(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
     let mut folds = work.held_out(&free, &fitted, &sigma);
     if settings.choice == Choice::HeldOut {
         loop {
@@ -130,12 +171,12 @@ pub fn identify(
             folds = round[at].folds.clone();
         }
     }
-    let step_share = work.settle_step(&laws, &mut fitted)?;
+    let other_step = work.settle_step(&laws, &mut fitted)?;
     if richer.is_empty() && is_wrong(work.misfit(&fitted)) {
         // A law that is stated has neighbours all the same.
         richer = work.neighbours(&laws, &fitted, &sigma);
     }
-    let found = work.judge(mechanism, laws, fitted, trials, &richer, step_share, start)?;
+    let found = work.judge(mechanism, laws, fitted, (trials, &richer), &other_step, start)?;
     Ok(ServoIdentification { directions, ..found })
 }
 
@@ -151,6 +192,13 @@ fn check(mechanism: &Mechanism, logs: &[ServoLog], settings: &ServoSettings) -> 
     demand("settings", settings.joints.len())?;
     for log in logs {
         demand(&log.name, log.joints())?;
+        for channel in [Channel::Velocity, Channel::Effort, Channel::Current] {
+            let rows = (0..n).filter_map(|j| log.measured(channel, j)).find(|v| v.len() != log.rows());
+            if let Some(values) = rows {
+                let (log, expected, found) = (log.name.clone(), log.rows(), values.len());
+                return Err(ServoError::Rows { log, channel: channel.name(), expected, found });
+            }
+        }
         if log.rows() < LEAST_ROWS {
             let (expected, found) = (LEAST_ROWS, log.rows());
             return Err(ServoError::Short { log: log.name.clone(), expected, found });
@@ -172,6 +220,15 @@ struct Tried {
     gain: f64,
 }
 
+/// An estimate with another step of the simulation: half of it, or twice.
+struct OtherStep {
+    estimate: Vec<f64>,
+    /// Error of the chosen step over what the estimate moves by: of second order, four thirds with half of it; with twice a third, counted thrice.
+    error: f64,
+    /// RMS by which half the step moves the readings, over that of the residual.
+    share: f64,
+}
+
 /// Fits that leave a fold out each.
 #[derive(Debug, Clone, Default)]
 struct Folds {
@@ -181,8 +238,15 @@ struct Folds {
 
 struct Work<'a> {
     chains: &'a [Chain],
-    logs: &'a [ServoLog],
+    logs: Vec<ServoLog>,
     settings: &'a ServoSettings,
+    /// What the sum of squares holds.
+    channels: Vec<Channel>,
+    measured: Measured,
+    efforts: Vec<EffortUse>,
+    outliers: Vec<Outliers>,
+    /// What parameters move by with the time over which efforts are read, where the logs do not tell it.
+    by_span: Vec<(Free, f64)>,
     blocks: Vec<Block>,
     scheme: Scheme,
     evaluations: usize,
@@ -208,7 +272,7 @@ impl Work<'_> {
     }
 
     fn start(&self, known: &ServoValues, plain: &[Free]) -> Result<crate::start::LinearStart, ServoError> {
-        linear_start(self.chains, self.logs, known, plain, self.scheme, &StartSettings::default())
+        linear_start(self.chains, &self.logs, known, plain, self.scheme, &StartSettings::default())
             .map_err(|source| ServoError::Signal { log: self.logs[0].name.clone(), source })
     }
 
@@ -227,7 +291,7 @@ impl Work<'_> {
         }
         let mut with = laws.clone();
         with.insert(Addition::Zero);
-        let free = self.settings.free(self.chains, &with);
+        let free = self.free(&with);
         let short = GaussNewton { evaluations: 14, tolerance: 1e-3, ..GaussNewton::default() };
         let fit_of = |work: &mut Self, known: &ServoValues| -> Result<Fitted, ServoError> {
             let start = work.start(known, plain)?;
@@ -244,7 +308,7 @@ impl Work<'_> {
                 other.joints[*j].direction = -other.joints[*j].direction;
                 let fitted = fit_of(self, &other);
                 // By one measure: the residuals of the better fit so far.
-                let sigma = &best.evaluation.mean_squares(&|_| true);
+                let sigma = &best.evaluation.variances(&|_| true);
                 let sigma: Vec<f64> = sigma.iter().map(|s| s.sqrt().max(1e-12)).collect();
                 let loss = |f: &Fitted| f.evaluation.loss(&sigma, &|_| true);
                 let ratio = fitted.as_ref().map_or(f64::INFINITY, |f| (loss(f) / loss(&best)).sqrt());
@@ -267,11 +331,22 @@ impl Work<'_> {
     }
 
     fn problem<'b>(&'b self, free: &'b [Free], scheme: Scheme) -> ServoProblem<'b> {
-        ServoProblem { chains: self.chains, logs: self.logs, scheme, free, blocks: &self.blocks }
+        ServoProblem {
+            chains: self.chains,
+            logs: &self.logs,
+            scheme,
+            free,
+            channels: &self.channels,
+            blocks: &self.blocks,
+        }
+    }
+
+    fn free(&self, laws: &BTreeSet<Addition>) -> Vec<Free> {
+        self.settings.free(self.chains, laws, &self.measured)
     }
 
     fn fit(&mut self, laws: &BTreeSet<Addition>, start: &ServoValues) -> Result<Fitted, Lost> {
-        let free = self.settings.free(self.chains, laws);
+        let free = self.free(laws);
         self.refit(&free, start, self.scheme, &GaussNewton::default())
     }
 
@@ -285,6 +360,139 @@ impl Work<'_> {
         let fitted = fit(&self.problem(free, scheme), start, settings, &|_| true)?;
         self.evaluations += fitted.evaluations;
         Ok(fitted)
+    }
+
+    /// Leaves out readings that stand out alone of what a fit misses, of the channels from one on: too small for a spike of the reading itself, and no
+    /// motion of a joint. Returns whether there are any.
+    fn leave_out(&mut self, fitted: &Fitted, from: usize) -> Result<bool, ServoError> {
+        let n = fitted.values.joints.len();
+        let simulated = readings(&self.problem(&[], self.scheme), &fitted.values)?;
+        let before = self.outliers.len();
+        for (slot, simulated) in simulated.iter().enumerate().skip(from * n) {
+            let (channel, joint) = (self.channels[slot / n], slot % n);
+            let mut rest = simulated.as_slice();
+            for (l, log) in self.logs.iter_mut().enumerate() {
+                let Some(measured) = log.measured(channel, joint) else { continue };
+                let (own, others) = rest.split_at(measured.len());
+                rest = others;
+                let miss = |(m, s): (&f64, &f64)| if m.is_nan() { 0.0 } else { m - s };
+                let mut residual: Vec<f64> = measured.iter().zip(own).map(miss).collect();
+                if let Some(rows) = log.left_out.get(joint).filter(|_| channel == Channel::Position) {
+                    // What stands for a spike is no reading.
+                    for row in rows.iter().filter(|row| **row > 0) {
+                        residual[*row] = residual[row - 1];
+                    }
+                }
+                let step = match channel {
+                    Channel::Position => log.resolution.get(joint).copied().unwrap_or(0.0),
+                    _ => 0.0,
+                };
+                let rows = outliers::of(&residual, measured, step)
+                    .map_err(|source| ServoError::Signal { log: log.name.clone(), source })?;
+                if !rows.is_empty() {
+                    log.leave_out(channel, joint, &rows);
+                    self.outliers.push(Outliers { log: l, joint, channel, rows: rows.len() });
+                }
+            }
+        }
+        Ok(self.outliers.len() > before)
+    }
+
+    /// Adds what was measured beside positions to the sum of squares, as far as it is wanted and makes sense; `fitted`: to positions alone.
+    fn take_channels(&mut self, free: &[Free], fitted: &mut Fitted) -> Result<(), ServoError> {
+        let n = fitted.values.joints.len();
+        let has = |c: &Channel| {
+            self.settings.channels.contains(c)
+                && (0..n).any(|j| self.logs.iter().any(|log| log.measured(*c, j).is_some()))
+        };
+        let wanted: Vec<Channel> = Channel::ALL.into_iter().filter(has).collect();
+        if wanted.iter().any(|c| c.tells_effort()) {
+            let doubt = self.doubt_of_gains(free, fitted);
+            let taken =
+                efforts::take(self.chains, &self.logs, &fitted.values, self.scheme, self.settings, &doubt)?;
+            self.logs = taken.logs;
+            self.outliers.extend(taken.outliers);
+            self.measured = taken.measured;
+            self.efforts = taken.uses;
+            fitted.values = taken.start;
+        }
+        let left = |c: &Channel| match c {
+            Channel::Effort => self.measured.effort.contains(&true),
+            Channel::Current => self.measured.current.contains(&true),
+            Channel::Position | Channel::Velocity => *c != Channel::Position,
+        };
+        self.channels.extend(wanted.into_iter().filter(left));
+        Ok(())
+    }
+
+    /// A fit to all channels: efforts have a mean of the command over a period in them, or what it is at an instant, as they are met better. The first has
+    /// slopes that lead to the second. Where both are met alike, what they make of the velocity gain differs all the same.
+    fn fit_channels(&mut self, free: &[Free], start: &ServoValues) -> Result<Fitted, Lost> {
+        let mean = self.refit(free, start, self.scheme, &GaussNewton::default())?;
+        let jumps = self.scheme.hold == Hold::Held && self.scheme.effort_at == EffortAt::Drive;
+        if !jumps || !self.channels.iter().any(|c| c.tells_effort()) {
+            return Ok(mean);
+        }
+        let instant = Scheme { effort_span_s: INSTANT * self.scheme.effort_span_s, ..self.scheme };
+        let sharp = self.refit(free, &mean.values, instant, &GaussNewton::default());
+        let sigma: Vec<f64> =
+            mean.evaluation.variances(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
+        let loss = |f: &Fitted| f.evaluation.loss(&sigma, &|_| true);
+        let Ok(sharp) = sharp else { return Ok(mean) };
+        let ratio = loss(&sharp) / loss(&mean);
+        if (ratio - 1.0).abs() < ALIKE {
+            let moved = sharp.estimate.iter().zip(&mean.estimate).map(|(a, b)| (a - b).abs());
+            self.by_span = free.iter().cloned().zip(moved).collect();
+        }
+        if ratio < 1.0 {
+            self.scheme = instant;
+            return Ok(sharp);
+        }
+        Ok(mean)
+    }
+
+    /// By joint, the relative error of its position gain that is beyond all doubt: twice what a stated one may have, five times the half width of the
+    /// 95 % interval of one that positions tell; infinite where the scale of gain, rotor and friction is open, since the least error of the model moves it.
+    fn doubt_of_gains(&self, free: &[Free], fitted: &Fitted) -> Vec<f64> {
+        let found = deviations(&self.problem(free, self.scheme), fitted);
+        let open = groups(free, &found.inside, &found.correlation);
+        let of = |j: usize| {
+            let gain = |f: &Free| f.as_term() == Some(Term::PositionGain) && f.joints().contains(&j);
+            let Some(k) = free.iter().position(gain) else { return 2.0 * self.settings.gain_error };
+            let half = |sd: f64| found.quantile[k] * sd / fitted.estimate[k].abs();
+            let half = found.jackknife[k].map_or(f64::INFINITY, half);
+            let open = open.iter().any(|g| g.kind == GroupKind::Scale && g.members.contains(&k));
+            if open && half > OPEN_SCALE { f64::INFINITY } else { 5.0 * half }
+        };
+        (0..fitted.values.joints.len()).map(of).collect()
+    }
+
+    /// Every measured effort with what the last fit leaves of it.
+    fn explained(&self, fitted: &Fitted) -> Vec<EffortUse> {
+        let n = fitted.values.joints.len();
+        let squares = fitted.evaluation.mean_squares(&|_| true);
+        let one = |e: &EffortUse| {
+            let Some(c) = self.channels.iter().position(|c| *c == e.channel).filter(|_| e.verdict.is_taken())
+            else {
+                return *e;
+            };
+            let square = squares[c * n + e.joint];
+            EffortUse {
+                rms: square.sqrt(),
+                explained: 1.0 - square / self.variance(e.channel, e.joint),
+                ..*e
+            }
+        };
+        self.efforts.iter().map(one).collect()
+    }
+
+    /// Variance of what a channel reads of a joint.
+    fn variance(&self, channel: Channel, joint: usize) -> f64 {
+        let logs = || self.logs.iter().filter_map(|log| log.measured(channel, joint));
+        let all = || logs().flatten().filter(|x| !x.is_nan());
+        let rows = all().count().max(1) as f64;
+        let mean = all().sum::<f64>() / rows;
+        all().map(|x| (x - mean) * (x - mean)).sum::<f64>() / rows
     }
 
     /// A fit from a linear start; where signs or units are wrong that is no start, and one that is stable takes its place.
@@ -369,7 +577,7 @@ impl Work<'_> {
             let mut with = laws.clone();
             with.insert(addition);
             let begin = self.begin(&fitted.values, &with, Some(addition));
-            let free = self.settings.free(self.chains, &with);
+            let free = self.free(&with);
             let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
             let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
             let beside = laws.iter().copied().collect();
@@ -402,63 +610,91 @@ impl Work<'_> {
         median(told.map(|(s, floor)| s.sqrt() / floor).collect())
     }
 
-    /// Halves the step until the simulation hardly moves; returns the share by which it still does.
-    fn settle_step(&mut self, laws: &BTreeSet<Addition>, fitted: &mut Fitted) -> Result<f64, ServoError> {
-        let free = self.settings.free(self.chains, laws);
+    /// Halves the step until the simulation hardly moves. Where nothing but rounding is left of the readings, rests of the encoders then count
+    /// once, and the step is halved once more, since the intervals are narrower than the error of the step.
+    fn settle_step(
+        &mut self,
+        laws: &BTreeSet<Addition>,
+        fitted: &mut Fitted,
+    ) -> Result<OtherStep, ServoError> {
+        let free = self.free(laws);
+        let half = |scheme: Scheme| Scheme { step_s: 0.5 * scheme.step_s, ..scheme };
         let mut share = 0.0;
         for round in 0..=HALVINGS {
             share = self.step_share(fitted)?;
             if self.settings.step_s.is_some() || share <= STEP_SHARE || round == HALVINGS {
                 break;
             }
-            self.scheme.step_s *= 0.5;
+            self.scheme = half(self.scheme);
             *fitted = self.refit(&free, &fitted.values, self.scheme, &GaussNewton::default())?;
         }
-        Ok(share)
+        let right = !is_wrong(self.misfit(fitted));
+        if right {
+            self.logs.iter_mut().for_each(|log| log.still_s = STILL_S);
+            *fitted = self.refit(&free, &fitted.values, self.scheme, &GaussNewton::default())?;
+        }
+        if right && self.settings.step_s.is_none() {
+            let estimate = fitted.estimate.clone();
+            self.scheme = half(self.scheme);
+            *fitted = self.refit(&free, &fitted.values, self.scheme, &GaussNewton::default())?;
+            return Ok(OtherStep { estimate, error: 1.0, share: self.step_share(fitted)? });
+        }
+        let short = GaussNewton { evaluations: 5, tolerance: 1e-6, reweighted: 0 };
+        let finer = self.refit(&free, &fitted.values, half(self.scheme), &short)?;
+        Ok(OtherStep { estimate: finer.estimate, error: 4.0 / 3.0, share })
     }
 
-    /// RMS by which half the step moves the readings, over that of the residual.
+    /// RMS by which half the step moves the readings, over that of the residual: of the channel that it moves most.
     fn step_share(&mut self, fitted: &Fitted) -> Result<f64, Lost> {
         let fine = Scheme { step_s: 0.5 * self.scheme.step_s, ..self.scheme };
-        let coarse = readings(self.chains, self.logs, &fitted.values, self.scheme)?;
-        let fine = readings(self.chains, self.logs, &fitted.values, fine)?;
+        let coarse = readings(&self.problem(&[], self.scheme), &fitted.values)?;
+        let fine = readings(&self.problem(&[], fine), &fitted.values)?;
         self.evaluations += 2;
-        let moved: f64 =
-            coarse.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / coarse.len() as f64;
-        let squares = fitted.evaluation.mean_squares(&|_| true);
-        let residual = squares.iter().sum::<f64>() / squares.len() as f64;
-        Ok((moved / residual).sqrt())
+        let moved: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| mean_square_between(a, b)).collect();
+        let residual = fitted.evaluation.mean_squares(&|_| true);
+        let n = fitted.values.joints.len();
+        let of_channel = |all: &[f64], c: usize| all[c * n..(c + 1) * n].iter().sum::<f64>();
+        let share = |c: usize| (of_channel(&moved, c) / of_channel(&residual, c)).sqrt();
+        Ok((0..self.channels.len()).map(share).fold(0.0, f64::max))
     }
 
     /// Intervals, verdicts, groups and errors of the chosen law.
-    #[expect(clippy::too_many_arguments, reason = "what the steps before left, each used once")]
     fn judge(
         mut self,
         mechanism: &Mechanism,
         laws: BTreeSet<Addition>,
         fitted: Fitted,
-        trials: Vec<AdditionTrial>,
-        richer: &[Tried],
-        step_share: f64,
+        (trials, richer): (Vec<AdditionTrial>, &[Tried]),
+        other_step: &OtherStep,
         start: crate::start::LinearStart,
     ) -> Result<ServoIdentification, ServoError> {
-        let free = self.settings.free(self.chains, &laws);
+        let free = self.free(&laws);
         let n = mechanism.rates();
-        let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
+        let squares = fitted.evaluation.mean_squares(&|_| true);
+        let rms: Vec<f64> = squares[..n].iter().map(|s| s.sqrt()).collect();
         let floor: Vec<f64> =
             (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
         let misfit = self.misfit(&fitted);
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
-        let spreads = self.spreads(&free, &fitted, richer, is_wrong(misfit))?;
-        let parameters = parameters(&free, &fitted, &found, &spreads, self.settings, self.logs);
-        let groups = groups(&free, &found.inside, &found.correlation);
+        let spreads = self.spreads(&free, &fitted, (richer, other_step), is_wrong(misfit))?;
+        let mut groups = groups(&free, &found.inside, &found.correlation);
+        let spreads = (spreads.as_slice(), other_step.error);
+        let parameters = parameters(&free, &fitted, &found, &groups, spreads, self.settings, &self.logs);
+        // A scale that measured efforts tell well is none that is open, however much it moves its members together.
+        let settled = |k: &usize| {
+            let p = &parameters[*k];
+            let narrow = p.half_width.is_some_and(|half| half <= SETTLED_SCALE * p.value.abs());
+            narrow && p.free.joints().iter().any(|j| self.measured.any(*j))
+        };
+        let scaled = |k: &&usize| free[**k].as_term().is_some_and(Term::scales_with_effort);
+        groups.retain(|g| g.kind != GroupKind::Scale || !g.members.iter().filter(scaled).all(settled));
         let mut horizons = Vec::new();
         for horizon_s in [0.1, 0.5, 2.0, f64::INFINITY] {
             horizons.push(HorizonError { horizon_s, rms: self.horizon(&fitted, horizon_s)? });
         }
         let of_log = |l: usize| -> Vec<f64> {
             let squares = fitted.evaluation.mean_squares(&|b| self.blocks[b].log == l);
-            squares.iter().map(|s| s.sqrt()).collect()
+            squares[..n].iter().map(|s| s.sqrt()).collect()
         };
         let count = fitted.evaluation.count;
         Ok(ServoIdentification {
@@ -468,13 +704,16 @@ impl Work<'_> {
             additions: laws.into_iter().collect(),
             trials,
             directions: Vec::new(),
+            outliers: self.outliers.clone(),
+            efforts: self.explained(&fitted),
+            channels: self.channels.clone(),
             scheme: self.scheme,
             rms_by_log: (0..self.logs.len()).map(of_log).collect(),
             rms,
-            command_rms: command_rms(self.logs, n),
+            command_rms: command_rms(&self.logs, n),
             floor,
             misfit,
-            step_share,
+            step_share: other_step.share,
             horizons,
             start_residual: start.residual,
             start: start.values,
@@ -491,22 +730,25 @@ impl Work<'_> {
         &mut self,
         free: &[Free],
         fitted: &Fitted,
-        richer: &[Tried],
+        (richer, other_step): (&[Tried], &OtherStep),
         wrong: bool,
     ) -> Result<Vec<Spread>, ServoError> {
         let mut out = vec![Spread::default(); free.len()];
         let short = GaussNewton { evaluations: 5, tolerance: 1e-6, reweighted: 0 };
         let estimate = &fitted.estimate;
-        // Half the step.
-        let fine = Scheme { step_s: 0.5 * self.scheme.step_s, ..self.scheme };
-        let half = self.refit(free, &fitted.values, fine, &short)?;
-        out.iter_mut().zip(&half.estimate).zip(estimate).for_each(|((s, a), b)| s.step = (a - b).abs());
+        out.iter_mut().zip(&other_step.estimate).zip(estimate).for_each(|((s, a), b)| s.step = (a - b).abs());
         // Stated gains that are wrong.
-        if self.settings.known_gain.iter().any(|k| *k) && self.settings.gain_error > 0.0 {
+        let is_free = |j: usize| {
+            free.iter().any(|f| f.as_term() == Some(Term::PositionGain) && f.joints().contains(&j))
+        };
+        let stated: Vec<usize> = (0..fitted.values.joints.len())
+            .filter(|j| self.settings.known_gain[*j] && !is_free(*j))
+            .collect();
+        if !stated.is_empty() && self.settings.gain_error > 0.0 {
             for side in [-1.0, 1.0] {
                 let mut values = fitted.values.clone();
-                for (joint, known) in values.joints.iter_mut().zip(&self.settings.known_gain) {
-                    if *known {
+                for (j, joint) in values.joints.iter_mut().enumerate() {
+                    if stated.contains(&j) {
                         let factor = 1.0 + side * self.settings.gain_error;
                         joint.set(Term::PositionGain, factor * joint.get(Term::PositionGain));
                     }
@@ -516,6 +758,11 @@ impl Work<'_> {
                         s.gain = s.gain.max((a - b).abs());
                     }
                 }
+            }
+        }
+        for (f, moved) in &self.by_span {
+            if let Some(k) = free.iter().position(|g| g.target == f.target) {
+                out[k].reading = *moved;
             }
         }
         if !wrong {
@@ -531,7 +778,9 @@ impl Work<'_> {
                 }
             }
         }
-        let of_folds = self.held_out(free, fitted, &vec![1.0; fitted.values.joints.len()]).estimates;
+        let of_folds = self
+            .held_out(free, fitted, &vec![1.0; fitted.values.joints.len() * self.channels.len()])
+            .estimates;
         let folds = of_folds.len() as f64;
         for (k, spread) in out.iter_mut().enumerate() {
             let mean = of_folds.iter().map(|e| e[k]).sum::<f64>() / folds;
@@ -559,6 +808,7 @@ impl Work<'_> {
             logs: &logs,
             scheme: self.scheme,
             free: &[],
+            channels: &[Channel::Position],
             blocks: &self.blocks,
         };
         let sigma = vec![1.0; fitted.values.joints.len()];
@@ -595,21 +845,8 @@ fn is_wrong(misfit: f64) -> bool {
     misfit.is_nan() || misfit > MISFIT
 }
 
-/// Simulated readings of all logs, log by log, row by row of every chain.
-fn readings(
-    chains: &[Chain],
-    logs: &[ServoLog],
-    values: &ServoValues,
-    scheme: Scheme,
-) -> Result<Vec<f64>, Lost> {
-    let mut out = Vec::new();
-    for log in logs {
-        for chain in chains {
-            let rollout = crate::rollout::Rollout::new(chain, scheme, &[]);
-            rollout.run(values, log, |row| out.extend_from_slice(row.reading))?;
-        }
-    }
-    Ok(out)
+fn mean_square_between(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / (a.len() as f64).max(1.0)
 }
 
 fn command_rms(logs: &[ServoLog], joints: usize) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! A joint behind a position-controlled drive, and how its motion is simulated.
 
+use crate::channel::EffortAt;
 use crate::term::Term;
 
 /// What the effort limit of a drive acts on.
@@ -101,10 +102,24 @@ pub struct Scheme {
     pub load: LoadOf,
     /// What commands do between samples.
     pub hold: Hold,
+    /// Where efforts are measured. Default: at the drive.
+    pub effort_at: EffortAt,
+    /// Time about its instant over which a measured effort of a drive has the mean of the command, s. A command that is held jumps from sample to sample,
+    /// and so does the effort: an effort that was read at an instant has a short one, of which the fit sees little slope until it is close; one that
+    /// is a mean over a period has that. Default 5e-3.
+    pub effort_span_s: f64,
 }
 
 impl Default for Scheme {
     fn default() -> Self {
-        Scheme { step_s: 5e-3, sign_width: 0.0, middle: true, load: LoadOf::default(), hold: Hold::default() }
+        Scheme {
+            step_s: 5e-3,
+            sign_width: 0.0,
+            middle: true,
+            load: LoadOf::default(),
+            hold: Hold::default(),
+            effort_at: EffortAt::default(),
+            effort_span_s: 5e-3,
+        }
     }
 }

@@ -1,5 +1,9 @@
 //! Logs of commands and positions.
 
+use dynid_motion::signal::SignalError;
+use dynid_motion::spikes::{self, SpikeSettings};
+
+use crate::channel::Channel;
 use crate::joint::Hold;
 
 /// Commands and encoder readings of all joints over one record.
@@ -18,6 +22,12 @@ pub struct ServoLog {
     pub feed_forward: Vec<Vec<f64>>,
     /// Encoder readings, joint after joint, rad or m.
     pub position: Vec<Vec<f64>>,
+    /// Measured encoder velocities; empty, as a whole or for a joint: none.
+    pub velocity: Vec<Vec<f64>>,
+    /// Measured efforts, N m or N, positive with the encoder's direction; empty, as a whole or for a joint: none.
+    pub effort: Vec<Vec<f64>>,
+    /// Measured currents, A, alike.
+    pub current: Vec<Vec<f64>>,
     /// Steps of the encoders; 0: not known.
     pub resolution: Vec<f64>,
     /// Readings at which the first rollout begins, in place of the first row.
@@ -27,10 +37,21 @@ pub struct ServoLog {
     /// Time behind the beginning of a rollout that no sum holds, s: the velocity it begins with is not measured, and a position loop forgets
     /// it. Not where [`ServoLog::start`] is given. Default 0.2.
     pub settle_s: f64,
+    /// Time from which an encoder that stands still says less with every row, s: the error of its rounding is the same in all of them, and a long rest
+    /// would outweigh all motion. Default infinite: every row counts alike.
+    pub still_s: f64,
+    /// Rows whose readings do not count, joint after joint; empty: none. [`ServoLog::leave_out_spikes`] finds them.
+    pub left_out: Vec<Vec<usize>>,
 }
 
 /// Time in which position loops of robots forget where they began: two to four of their time constants `(k_d + F_v)/k_p`.
 const SETTLE_S: f64 = 0.2;
+
+/// Largest share of a signal that may stick out; beyond it is noise.
+const MOST_SPIKES: f64 = 0.05;
+
+/// Steps of an encoder within which it stands still: it may flicker between two.
+const FLICKER: f64 = 1.5;
 
 impl ServoLog {
     /// A log from its arrays; resolutions of encoders are the smallest steps of their readings, where all steps are multiples of it.
@@ -47,8 +68,16 @@ impl ServoLog {
         let whole = command.iter().chain(&position).all(|values| values.len() == time.len());
         assert!(whole, "rows of time, commands and positions");
         let resolution = position.iter().map(|x| resolution(x)).collect();
-        let settle_s = SETTLE_S;
-        ServoLog { name: name.into(), time, command, position, resolution, settle_s, ..ServoLog::default() }
+        ServoLog {
+            name: name.into(),
+            time,
+            command,
+            position,
+            resolution,
+            settle_s: SETTLE_S,
+            still_s: f64::INFINITY,
+            ..ServoLog::default()
+        }
     }
 
     /// Number of rows.
@@ -68,6 +97,54 @@ impl ServoLog {
         steps.get(steps.len() / 2).copied().unwrap_or(0.0)
     }
 
+    /// Replaces single readings of the encoders that stick out, such as those of a bus that failed, by the running median and leaves them out of all
+    /// sums. Returns joints with how many.
+    ///
+    /// # Errors
+    /// [`SignalError`] of a signal that is not finite.
+    pub fn leave_out_spikes(&mut self) -> Result<Vec<(usize, usize)>, SignalError> {
+        let settings = SpikeSettings { cap: MOST_SPIKES, ..SpikeSettings::position() };
+        let mut out = Vec::new();
+        self.resolution.resize(self.joints(), 0.0);
+        for j in 0..self.joints() {
+            let found = spikes::remove(&mut self.position[j], &settings)?;
+            if found.removed {
+                out.push((j, found.flagged.len()));
+                self.leave_out(Channel::Position, j, &found.flagged);
+                // The smallest step between readings was none of the encoder.
+                self.resolution[j] = resolution(&self.position[j]);
+            }
+        }
+        Ok(out)
+    }
+
+    /// Leaves readings of a joint out of all sums.
+    pub(crate) fn leave_out(&mut self, channel: Channel, joint: usize, rows: &[usize]) {
+        let n = self.joints();
+        let values = match channel {
+            Channel::Position => {
+                self.left_out.resize(n, Vec::new());
+                self.left_out[joint].extend(rows);
+                return;
+            }
+            Channel::Velocity => &mut self.velocity[joint],
+            Channel::Effort => &mut self.effort[joint],
+            Channel::Current => &mut self.current[joint],
+        };
+        rows.iter().for_each(|row| values[*row] = f64::NAN);
+    }
+
+    /// What a channel reads of a joint, where it was logged.
+    pub fn measured(&self, channel: Channel, joint: usize) -> Option<&[f64]> {
+        let of = match channel {
+            Channel::Position => &self.position,
+            Channel::Velocity => &self.velocity,
+            Channel::Effort => &self.effort,
+            Channel::Current => &self.current,
+        };
+        of.get(joint).filter(|values| !values.is_empty()).map(Vec::as_slice)
+    }
+
     /// Ranges of rows that one rollout covers.
     pub(crate) fn segments(&self) -> Vec<std::ops::Range<usize>> {
         let mut starts: Vec<usize> = std::iter::once(0).chain(self.breaks.iter().copied()).collect();
@@ -84,6 +161,36 @@ impl ServoLog {
             for row in segment {
                 out[row] = self.time[row] >= from;
             }
+        }
+        out
+    }
+
+    /// Weight of every reading of an encoder: a rest of `L` rows, `n` of which take [`ServoLog::still_s`], counts as `n²/L` readings, and as one at
+    /// least; 1 for all where the step of the encoder is not known; 0 for those that are left out.
+    pub(crate) fn weights(&self, joint: usize) -> Vec<f64> {
+        let readings = &self.position[joint];
+        let mut out = vec![1.0; readings.len()];
+        let step = self.resolution.get(joint).copied().unwrap_or(0.0);
+        let rows = self.still_s / self.period();
+        let mut first = if step > 0.0 && rows.is_finite() { 0 } else { readings.len() };
+        while first < readings.len() {
+            let (mut least, mut most) = (readings[first], readings[first]);
+            let mut end = first + 1;
+            while end < readings.len() {
+                (least, most) = (least.min(readings[end]), most.max(readings[end]));
+                if most - least > FLICKER * step {
+                    break;
+                }
+                end += 1;
+            }
+            let length = (end - first) as f64;
+            if length > rows {
+                out[first..end].fill((rows / length).powi(2).max(1.0 / length));
+            }
+            first = end;
+        }
+        if let Some(rows) = self.left_out.get(joint) {
+            rows.iter().for_each(|row| out[*row] = 0.0);
         }
         out
     }

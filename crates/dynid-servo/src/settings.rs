@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 
 use crate::chain::Chain;
+use crate::channel::{Channel, EffortAt};
 use crate::free::Free;
 use crate::joint::{Hold, Limited, LoadOf, ServoJoint};
+use crate::measured::Measured;
 use crate::term::Term;
 
 /// Which joints share a number that is not known.
@@ -65,6 +67,12 @@ pub enum Choice {
 /// Standard deviations from what is known of it within which a zero must lie.
 const ZERO_STDS: f64 = 3.0;
 
+/// Standard deviations within which 95 % of a normal distribution lie.
+const QUANTILE: f64 = 1.96;
+
+/// Farthest that measured efforts may lie behind or ahead of positions, s.
+const MOST_EFFORT_DELAY: f64 = 0.1;
+
 /// What is known and what is asked.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -75,6 +83,14 @@ pub struct ServoSettings {
     pub known_gain: Vec<bool>,
     /// Relative error that known gains may have, 95 %. Default 0.1.
     pub gain_error: f64,
+    /// Per joint, whether its velocity gain is known. Where it is not, a measured effort of the drive tells it apart from viscous friction.
+    pub known_damping: Vec<bool>,
+    /// Per joint, whether its torque constant is known.
+    pub known_constant: Vec<bool>,
+    /// What the sum of squares holds beside positions, where logs measure it. Default: efforts and currents.
+    pub channels: Vec<Channel>,
+    /// Where efforts are measured. Default: at the drive.
+    pub effort_at: EffortAt,
     /// Whether every joint has a position gain of its own where it is not known; else all share one. Default false, with what gains of their
     /// own would predict as a trial.
     pub own_gains: bool,
@@ -109,6 +125,10 @@ impl ServoSettings {
             joints: vec![ServoJoint::default(); joints],
             known_gain: vec![false; joints],
             gain_error: 0.1,
+            known_damping: vec![false; joints],
+            known_constant: vec![false; joints],
+            channels: vec![Channel::Effort, Channel::Current],
+            effort_at: EffortAt::Drive,
             own_gains: false,
             delay: Shared::Chain,
             known_delay: false,
@@ -133,7 +153,10 @@ impl ServoSettings {
 
     /// What a law leaves free: position gains that are not known, rotor inertia, viscous and Coulomb friction, delay, the terms that are found
     /// besides, and those of the additions.
-    pub fn free(&self, chains: &[Chain], laws: &BTreeSet<Addition>) -> Vec<Free> {
+    ///
+    /// Where efforts are `measured`: their zeros, torque constants and velocity gains that are not known, their delay, and known position gains
+    /// within the error that they may have.
+    pub fn free(&self, chains: &[Chain], laws: &BTreeSet<Addition>, measured: &Measured) -> Vec<Free> {
         let s = self;
         let n = s.joints.len();
         let own = |term: Term| (0..n).map(move |j| Free::term(term, [j]));
@@ -159,6 +182,7 @@ impl ServoSettings {
         for term in &s.find {
             out.extend(own(*term));
         }
+        out.extend(s.of_measured(measured, laws.contains(&Addition::OwnGains)));
         for addition in laws {
             match addition {
                 Addition::Offset => out.extend(own(Term::Offset)),
@@ -179,6 +203,44 @@ impl ServoSettings {
                 Addition::OwnGains => {}
             }
         }
+        out
+    }
+    /// What measured efforts ask for and tell.
+    fn of_measured(&self, measured: &Measured, own_gains: bool) -> Vec<Free> {
+        let s = self;
+        let joints = || 0..s.joints.len();
+        let told: Vec<usize> = joints().filter(|j| measured.any(*j)).collect();
+        let mut out = Vec::new();
+        if told.is_empty() {
+            return out;
+        }
+        if s.effort_at == EffortAt::Drive {
+            let damping = told.iter().filter(|j| !s.known_damping[**j]);
+            out.extend(damping.map(|j| Free::term(Term::VelocityGain, [*j])));
+        }
+        let unknown: Vec<usize> =
+            joints().filter(|j| measured.current[*j] && !s.known_constant[*j]).collect();
+        // Equal drives have equal constants.
+        if own_gains || s.known_gain.iter().any(|k| *k) {
+            out.extend(unknown.iter().map(|j| Free::term(Term::TorqueConstant, [*j])));
+        } else if !unknown.is_empty() {
+            out.push(Free::term(Term::TorqueConstant, unknown));
+        }
+        for j in joints() {
+            let newtons = measured.effort[j] || (measured.current[j] && s.known_constant[j]);
+            if newtons && s.known_gain[j] && s.gain_error > 0.0 {
+                let known = s.joints[j].get(Term::PositionGain);
+                let gain = Free::term(Term::PositionGain, [j]);
+                out.push(gain.known(known, known * s.gain_error / QUANTILE));
+            }
+        }
+        let zero = |term: Term, of: &[bool]| -> Vec<Free> {
+            joints().filter(|j| of[*j]).map(|j| Free::term(term, [j])).collect()
+        };
+        out.extend(zero(Term::EffortZero, &measured.effort));
+        out.extend(zero(Term::CurrentZero, &measured.current));
+        let delay = Free::term(Term::EffortDelay, told);
+        out.push(Free { lower: -MOST_EFFORT_DELAY, upper: MOST_EFFORT_DELAY, ..delay });
         out
     }
 }

@@ -37,11 +37,19 @@ pub enum Term {
     RateLimit,
     /// Time constant of the first-order smoothing of the command `t_c`, s; 0: none.
     SmoothingTime,
+    /// Effort per measured current `k_t`, behind the gear, N m/A.
+    TorqueConstant,
+    /// What a measured effort reads without any, N m.
+    EffortZero,
+    /// What a measured current reads without any, A.
+    CurrentZero,
+    /// Time by which measured efforts and currents lie behind the positions of the same rows, s; negative: ahead.
+    EffortDelay,
 }
 
 impl Term {
     /// Number of terms.
-    pub const COUNT: usize = 15;
+    pub const COUNT: usize = 19;
 
     /// All terms, in order.
     pub const ALL: [Term; Term::COUNT] = [
@@ -60,6 +68,10 @@ impl Term {
         Term::DeadBand,
         Term::RateLimit,
         Term::SmoothingTime,
+        Term::TorqueConstant,
+        Term::EffortZero,
+        Term::CurrentZero,
+        Term::EffortDelay,
     ];
 
     /// Name in files.
@@ -80,6 +92,10 @@ impl Term {
             Term::DeadBand => "dead_band",
             Term::RateLimit => "rate_limit",
             Term::SmoothingTime => "smoothing_time",
+            Term::TorqueConstant => "torque_constant",
+            Term::EffortZero => "effort_zero",
+            Term::CurrentZero => "current_zero",
+            Term::EffortDelay => "effort_delay",
         }
     }
 
@@ -97,14 +113,21 @@ impl Term {
             (Term::VelocityGain | Term::Viscous, true) => "N s/m",
             (Term::RotorInertia, false) => "kg m^2",
             (Term::RotorInertia, true) => "kg",
-            (Term::Coulomb | Term::Stiction | Term::Offset | Term::EffortLimit, false) => "N m",
-            (Term::Coulomb | Term::Stiction | Term::Offset | Term::EffortLimit, true) => "N",
+            (Term::Coulomb | Term::Stiction | Term::Offset | Term::EffortLimit | Term::EffortZero, false) => {
+                "N m"
+            }
+            (Term::Coulomb | Term::Stiction | Term::Offset | Term::EffortLimit | Term::EffortZero, true) => {
+                "N"
+            }
             (Term::StribeckVelocity | Term::RateLimit, false) => "rad/s",
             (Term::StribeckVelocity | Term::RateLimit, true) => "m/s",
             (Term::LoadFriction, _) => "1",
             (Term::Zero | Term::DeadBand, false) => "rad",
             (Term::Zero | Term::DeadBand, true) => "m",
-            (Term::Delay | Term::SmoothingTime, _) => "s",
+            (Term::Delay | Term::SmoothingTime | Term::EffortDelay, _) => "s",
+            (Term::TorqueConstant, false) => "N m/A",
+            (Term::TorqueConstant, true) => "N/A",
+            (Term::CurrentZero, _) => "A",
         }
     }
 
@@ -121,17 +144,25 @@ impl Term {
                 | Term::Stiction
                 | Term::Offset
                 | Term::EffortLimit
+                | Term::TorqueConstant
         )
+    }
+
+    /// Whether the term is one of a sensor, which no simulator asks for.
+    pub fn is_of_sensor(self) -> bool {
+        matches!(self, Term::EffortZero | Term::CurrentZero | Term::EffortDelay)
     }
 
     /// Values that physics allows.
     pub fn range(self) -> (f64, f64) {
         match self {
-            Term::Offset | Term::Zero => (f64::NEG_INFINITY, f64::INFINITY),
+            Term::Offset | Term::Zero | Term::EffortZero | Term::CurrentZero | Term::EffortDelay => {
+                (f64::NEG_INFINITY, f64::INFINITY)
+            }
             // A gear that loses half of what it carries; one that loses all of it locks itself.
             Term::LoadFriction => (0.0, 0.5),
             Term::StribeckVelocity => (1e-3, f64::INFINITY),
-            Term::RateLimit | Term::EffortLimit => (1e-9, f64::INFINITY),
+            Term::RateLimit | Term::EffortLimit | Term::TorqueConstant => (1e-9, f64::INFINITY),
             _ => (0.0, f64::INFINITY),
         }
     }
@@ -141,6 +172,7 @@ impl Term {
         match self {
             Term::EffortLimit | Term::RateLimit => f64::INFINITY,
             Term::StribeckVelocity => 0.1,
+            Term::TorqueConstant => 1.0,
             _ => 0.0,
         }
     }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use dynid::record::Outcome;
-use dynid::servo::{ServoConfig, ServoFile, ServoFiles, ServoParameterRecord, identify_servo};
+use dynid::servo::{
+    ServoConfig, ServoEffortRecord, ServoFile, ServoFiles, ServoParameterRecord, identify_servo,
+};
 use dynid::settings::PerJoint;
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs;
@@ -82,12 +84,30 @@ fn summary(file: &ServoFile) -> String {
     if let Some(rms) = &file.fit.robot_file_rms {
         out += &format!("robot file as it came:{}\n", per_joint(rms));
     }
+    if !file.fit.efforts.is_empty() {
+        let head = ["joint", "measured", "verdict", "RMS", "unit", "explained, %", "size"];
+        let rows: Vec<Vec<String>> = file.fit.efforts.iter().map(effort).collect();
+        out += "\n";
+        out += &table::aligned(&head, &rows);
+    }
     for log in &file.validation {
         let rms: Vec<f64> = log.rms.iter().map(|x| x.unwrap_or(f64::NAN)).collect();
         out +=
             &format!("validation {}:{}; command{}\n", log.log, per_joint(&rms), per_joint(&log.command_rms));
     }
     out + &format!("\n{}: {}\n", file.status, file.headline)
+}
+
+fn effort(e: &ServoEffortRecord) -> Vec<String> {
+    vec![
+        e.joint.clone(),
+        e.channel.clone(),
+        e.verdict.to_string(),
+        table::number(e.rms),
+        e.unit.clone(),
+        table::number(Some(100.0 * e.explained)),
+        table::number(e.ratio),
+    ]
 }
 
 fn row(p: &ServoParameterRecord) -> Vec<String> {

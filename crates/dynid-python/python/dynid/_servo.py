@@ -31,6 +31,9 @@ class CommandLog:
         `(n, joints)` commanded and measured positions, rad or m.
     velocity, effort
         `(n, joints)` commanded velocities and efforts that were fed forward, where there were some.
+    tau, current, dq
+        `(n, joints)` measured efforts, N m or N, currents, A, and velocities, where there are some; logs of a robot need not measure the same.
+        Velocities count with `fit=["effort", "current", "velocity"]`.
     joints
         Names of the columns. Default: `Robot.joints`, in that order. Joints that are left out stand still at zero.
     name
@@ -45,13 +48,16 @@ class CommandLog:
         *,
         velocity: ArrayLike | None = None,
         effort: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        current: ArrayLike | None = None,
+        dq: ArrayLike | None = None,
         joints: Sequence[str] | None = None,
         name: str = "log",
     ) -> None:
         self.t: NDArray[np.float64] = np.asarray(t, dtype=np.float64)
         if self.t.ndim != 1:
             raise ValueError(f"t: expected a vector of seconds, found shape {self.t.shape}")
-        given = {"command": command, "q": q, "velocity": velocity, "effort": effort}
+        given = {"command": command, "q": q, "velocity": velocity, "effort": effort, "tau": tau, "current": current, "dq": dq}
         self.signals: dict[str, NDArray[np.float64]] = {}
         for what, values in given.items():
             if values is None:
@@ -74,8 +80,8 @@ class CommandLog:
         unknown = [name for name in names if name not in joints]
         if unknown:
             raise ValueError(f"joints: {', '.join(unknown)} are not joints of the robot: {', '.join(joints)}")
-        prefixes = {"command": "cmd", "q": "q", "velocity": "cmd_velocity", "effort": "cmd_effort"}
-        signals = {f"{prefixes[what]}_{joint}": np.ascontiguousarray(table[:, k]) for what, table in self.signals.items() for k, joint in enumerate(names)}
+        prefixes = {"command": "cmd", "velocity": "cmd_velocity", "effort": "cmd_effort", "current": "i"}
+        signals = {f"{prefixes.get(what, what)}_{joint}": np.ascontiguousarray(table[:, k]) for what, table in self.signals.items() for k, joint in enumerate(names)}
         arrays: dict[str, Any] = {"t": self.t, **signals}
         np.savez(path, **arrays)
 
@@ -155,6 +161,7 @@ def servo(
     *,
     columns: Mapping[str, Any] | None = None,
     command: Mapping[str, Any] | None = None,
+    current: str | Mapping[str, Any] | None = None,
     progress: Progress = None,
     threads: int = 0,
     **settings: Any,
@@ -162,7 +169,8 @@ def servo(
     """Identifies drives from commands and positions, as `dynid servo` does: position gain, rotor inertia, friction, delay, offsets, zeros.
 
     `settings` are the keys of `[servo]`: `position_gain=20` where it is known, `velocity_gain`, `effort_limit`, `law=["offset"]`, `hold="line"`, ...
-    `columns` and `command` say where files have positions and commands, as in a configuration. `validation`: logs that are predicted only.
+    Efforts and currents that logs measure are met beside the positions; `fit=[]` leaves them alone. `columns`, `command` and `current` say where files have
+    positions and efforts, commands, and currents, as in a configuration. `validation`: logs that are predicted only.
 
     Raises `LogError` for logs that cannot be used, `SettingError` for a setting that is unknown or out of range.
     """
@@ -172,6 +180,8 @@ def servo(
     for signal in ("velocity", "effort"):
         if any(signal in log.signals for log in training if isinstance(log, CommandLog)):
             told.setdefault(signal, f"cmd_{signal}_{{joint}}")
+    if current is None and any("current" in log.signals for log in training if isinstance(log, CommandLog)):
+        current = "i_{joint}"
     with tempfile.TemporaryDirectory() as folder, robot_path(robot) as path:
 
         def entries(given: list[LogOfCommands], kind: str) -> list[dict[str, str]]:
@@ -195,6 +205,7 @@ def servo(
             **({"gravity": options["gravity"]} if "gravity" in options else {}),
             **({"columns": dict(columns)} if columns else {}),
             **({"command": told} if told else {}),
+            **({"current": current} if current is not None else {}),
         }
         text, page, files = _native.servo(as_json(config), progress=teller(progress), threads=threads)
     return Servo(text, page, dict(files))

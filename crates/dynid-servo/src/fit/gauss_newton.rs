@@ -3,6 +3,7 @@
 use dynid_linalg::Mat;
 
 use super::evaluation::{Evaluation, ServoProblem};
+use crate::channel::Channel;
 use crate::free::{Free, ServoValues};
 use crate::log::ServoLog;
 use crate::rollout::Lost;
@@ -87,14 +88,16 @@ const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-9;
 const MOST_DAMPING: f64 = 1e8;
 
-/// Least standard deviation of a joint's readings: that of its encoder's rounding, else a tiny share of its motion.
-pub(crate) fn floors(logs: &[ServoLog], joints: usize) -> Vec<f64> {
-    let floor = |j: usize| {
+/// Least standard deviation of every reading: that of the encoder's rounding, else a tiny number.
+pub(crate) fn floors(logs: &[ServoLog], channels: &[Channel], joints: usize) -> Vec<f64> {
+    let floor = |(channel, j): (Channel, usize)| {
         let of_logs = logs.iter().map(|log| log.floor(j)).fold(0.0_f64, f64::max);
-        of_logs.max(1e-9)
+        if channel == Channel::Position { of_logs.max(LEAST_STD) } else { LEAST_STD }
     };
-    (0..joints).map(floor).collect()
+    channels.iter().flat_map(|c| (0..joints).map(move |j| (*c, j))).map(floor).collect()
 }
+
+const LEAST_STD: f64 = 1e-9;
 
 /// Fits the free parameters from a start, to a choice of blocks.
 ///
@@ -107,10 +110,9 @@ pub fn fit(
     take: &dyn Fn(usize) -> bool,
 ) -> Result<Fitted, Lost> {
     let free = problem.free;
-    let floors = floors(problem.logs, start.joints.len());
+    let floors = floors(problem.logs, problem.channels, start.joints.len());
     let weights = |e: &Evaluation| -> Vec<f64> {
-        let squares = e.mean_squares(take);
-        squares.iter().zip(&floors).map(|(s, floor)| s.sqrt().max(*floor)).collect()
+        e.variances(take).iter().zip(&floors).map(|(s, floor)| s.sqrt().max(*floor)).collect()
     };
     let clip = |values: Vec<f64>| -> Vec<f64> {
         values.iter().zip(free).map(|(x, f)| x.clamp(f.lower, f.upper)).collect()

@@ -4,6 +4,7 @@ mod evaluation;
 mod gauss_newton;
 mod spread;
 
+pub(crate) use evaluation::readings;
 pub use evaluation::{Block, BlockSums, Evaluation, ServoProblem, blocks};
 pub(crate) use gauss_newton::with_priors;
 pub use gauss_newton::{Ending, Fitted, GaussNewton, Place, fit};

@@ -3,6 +3,7 @@
 use dynid_motion::signal::SignalError;
 
 use crate::chain::Chain;
+use crate::channel::Channel;
 use crate::fit::Ending;
 use crate::free::{Free, ServoValues};
 use crate::joint::Scheme;
@@ -33,6 +34,18 @@ pub enum ServoError {
         /// Joints found.
         found: usize,
     },
+    /// A measured signal that has not a value for every row.
+    #[error("{log}: {channel}: expected {expected} rows, found {found}")]
+    Rows {
+        /// Name of the log.
+        log: String,
+        /// Channel.
+        channel: &'static str,
+        /// Rows of the log.
+        expected: usize,
+        /// Rows of the signal.
+        found: usize,
+    },
     /// Too few rows to say anything.
     #[error("{log}: expected at least {expected} rows, found {found}")]
     Short {
@@ -50,12 +63,15 @@ pub enum ServoError {
 pub struct Spread {
     /// Largest change under laws that are richer by one of friction or offset.
     pub law: f64,
-    /// Change under half the step.
+    /// Change under half the step of the simulation; where nothing but rounding is left of the readings, under twice the step.
     pub step: f64,
     /// Standard deviation over fits that each leave a fold of the logs out.
     pub folds: f64,
     /// Largest change under stated gains that are wrong by their error.
     pub gain: f64,
+    /// Change with the time over which efforts are read, a period or an instant, where the logs do not tell it. Both are right for some sensor, so that the
+    /// value is not called unstable for it.
+    pub reading: f64,
 }
 
 /// What can be said of a parameter.
@@ -84,6 +100,10 @@ pub struct ServoParameter {
     pub value: f64,
     /// Half width of the 95 % interval with all spreads; `None`: there is none.
     pub half_width: Option<f64>,
+    /// The interval, within what is possible: value and half width, but where the scale of gain, rotor and friction is open. What readings tell of that is the
+    /// reciprocal, the share of bodies of known mass, so that with a relative half width `ρ` the interval goes from `value/(1 + ρ)` to `value/(1 - ρ)`.
+    /// `None`: there is none, or it has no upper end.
+    pub interval: Option<(f64, f64)>,
     /// Standard deviation by the block jackknife.
     pub std: Option<f64>,
     /// Standard deviation by the model alone: right only if the model is.
@@ -148,6 +168,58 @@ pub struct DirectionTrial {
 /// RMS with the other direction over that with the chosen one from which a direction is told.
 pub const TOLD_DIRECTION: f64 = 1.02;
 
+/// Single readings that stand out of what a fit misses, and were left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outliers {
+    /// Log.
+    pub log: usize,
+    /// Joint.
+    pub joint: usize,
+    /// Channel.
+    pub channel: Channel,
+    /// Readings.
+    pub rows: usize,
+}
+
+/// What a measured effort is beside that of a fit to positions alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EffortVerdict {
+    /// It is that of the drive, and the fit takes it.
+    Taken,
+    /// The fit takes it, but its size is too far from what positions tell: masses of the robot, stated gains or the unit are wrong.
+    OtherSize,
+    /// It runs against the drive, and is left out: its sign is the other one.
+    Against,
+    /// It has no sign, and is left out.
+    Unsigned,
+    /// The simulation explains less than half of its variance, scale and zero free, and it is left out.
+    Unlike,
+}
+
+impl EffortVerdict {
+    /// Whether the fit takes it.
+    pub fn is_taken(self) -> bool {
+        matches!(self, EffortVerdict::Taken | EffortVerdict::OtherSize)
+    }
+}
+
+/// A measured effort or current of a joint, and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffortUse {
+    /// Joint.
+    pub joint: usize,
+    /// Effort or current.
+    pub channel: Channel,
+    /// What it is.
+    pub verdict: EffortVerdict,
+    /// Share of its variance that the simulation explains: of the last fit if it is taken, else of the one to positions, scale and zero free.
+    pub explained: f64,
+    /// Measured over simulated effort of the fit to positions alone; `None`: a current whose torque constant is not known.
+    pub ratio: Option<f64>,
+    /// RMS residual of the last fit, N m, N or A; `NaN` where it is not taken.
+    pub rms: f64,
+}
+
 /// Error of rollouts that begin from measured states again and again.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HorizonError {
@@ -174,6 +246,12 @@ pub struct ServoIdentification {
     pub trials: Vec<AdditionTrial>,
     /// Directions that were looked for.
     pub directions: Vec<DirectionTrial>,
+    /// Readings that were left out.
+    pub outliers: Vec<Outliers>,
+    /// Measured efforts and currents.
+    pub efforts: Vec<EffortUse>,
+    /// Channels of the sum of squares.
+    pub channels: Vec<Channel>,
     /// How the simulation was done.
     pub scheme: Scheme,
     /// RMS residual of every joint over all logs, whole rollouts.

@@ -9,12 +9,13 @@ use crate::log::ServoLog;
 use crate::settings::ServoSettings;
 use crate::term::Term;
 
-/// Parameters with intervals and verdicts.
+/// Parameters with intervals and verdicts. `open`: those that are known together only.
 pub(super) fn parameters(
     free: &[Free],
     fitted: &Fitted,
     found: &Deviations,
-    spreads: &[Spread],
+    open: &[ServoGroup],
+    (spreads, of_step): (&[Spread], f64),
     settings: &ServoSettings,
     logs: &[ServoLog],
 ) -> Vec<ServoParameter> {
@@ -24,17 +25,20 @@ pub(super) fn parameters(
         let t = found.quantile[k];
         let std = found.jackknife[k];
         let half_width = std.map(|sd| {
-            // The step's error is of second order: half the step takes three quarters of it away.
-            let parts = [t * sd, spread.law, 4.0 / 3.0 * spread.step, t * spread.folds, spread.gain];
+            let parts = [t * sd, spread.law, of_step * spread.step, t * spread.folds, spread.gain];
             // Folds and jackknife measure the same thing: the larger counts.
             let own = parts[0].max(parts[3]);
-            (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()
+            let others = [parts[1], parts[2], parts[4], spread.reading];
+            others.iter().fold(own * own, |sum, x| sum + x * x).sqrt()
         });
         let joint = f.joints().first().map(|j| &fitted.values.joints[*j]);
         let scale = match (f.as_term(), joint) {
             (Some(Term::Zero), _) => 10.0 / 3.0 * settings.zero_std,
-            (Some(Term::Delay | Term::SmoothingTime), _) => value.abs().max(period),
-            (Some(Term::Offset), Some(joint)) => value.abs().max(joint.get(Term::Coulomb)),
+            (Some(Term::Delay | Term::SmoothingTime | Term::EffortDelay), _) => value.abs().max(period),
+            (Some(Term::Offset | Term::EffortZero), Some(joint)) => value.abs().max(joint.get(Term::Coulomb)),
+            (Some(Term::CurrentZero), Some(joint)) => {
+                value.abs().max(joint.get(Term::Coulomb) / joint.get(Term::TorqueConstant))
+            }
             _ => value.abs(),
         };
         let of_prior = f.prior.is_some_and(|(_, sd)| found.model[k].is_none_or(|m| m > sd / 3.0));
@@ -56,10 +60,24 @@ pub(super) fn parameters(
             }
             _ => ServoVerdict::NotSeen,
         };
+        let half_width = half_width.filter(|_| verdict != ServoVerdict::Prior);
+        let in_scale = f.as_term().is_some_and(Term::scales_with_effort)
+            && open.iter().any(|g| g.kind == GroupKind::Scale && g.members.contains(&k));
+        let interval = half_width.and_then(|half| {
+            let relative = half / value.abs();
+            let (lower, upper) = match in_scale {
+                true if relative < 1.0 => (value / (1.0 + relative), value / (1.0 - relative)),
+                true => (value / (1.0 + relative), f64::INFINITY),
+                false => (value - half, value + half),
+            };
+            let upper = upper.min(f.upper);
+            upper.is_finite().then_some((lower.max(f.lower), upper))
+        });
         ServoParameter {
             free: f.clone(),
             value,
-            half_width: half_width.filter(|_| verdict != ServoVerdict::Prior),
+            half_width,
+            interval,
             std,
             model_std: found.model[k],
             spread,
@@ -113,7 +131,15 @@ pub(crate) fn groups(free: &[Free], inside: &[usize], correlation: &Mat) -> Vec<
         let all = |of: &[Term]| terms.iter().all(|t| of.contains(t));
         let kind = match () {
             () if terms.contains(&Term::PositionGain) => GroupKind::Scale,
-            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => {
+            () if all(&[
+                Term::Delay,
+                Term::RotorInertia,
+                Term::SmoothingTime,
+                Term::Viscous,
+                Term::VelocityGain,
+                Term::EffortDelay,
+            ]) =>
+            {
                 GroupKind::Lag
             }
             () if all(&[Term::Zero, Term::Offset]) => GroupKind::Posture,

@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3,
 };
-use dynid_servo::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
+use dynid_servo::{
+    Chain, Channel, EffortAt, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Simulated, Term,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -118,5 +120,50 @@ pub(crate) fn log(
     let start = log.start.take();
     let mut log = ServoLog::new(log.name, log.time, command, position);
     log.start = start;
+    log
+}
+
+/// The same motion with what a channel of efforts measures of it, with noise of this standard deviation; the drives' own steps of `scheme` are
+/// taken sixteen times finer, so that an effort is that of its instant.
+pub(crate) fn log_with_efforts(
+    mechanism: &Mechanism,
+    joints: &[ServoJoint],
+    scheme: Scheme,
+    (rows, seed): (usize, u64),
+    (channel, at, noise): (Channel, EffortAt, f64),
+) -> ServoLog {
+    let fine = Scheme { step_s: scheme.step_s / 16.0, effort_at: at, effort_span_s: 1e-3 * PERIOD, ..scheme };
+    let mut log = log(mechanism, joints, fine, rows, seed);
+    let mut asked = log.clone();
+    asked.effort = log.position.clone();
+    let values = ServoValues { joints: joints.to_vec(), inertias: mechanism.inertia_vector() };
+    let mut efforts = vec![vec![0.0; rows]; 2];
+    Rollout::new(&Chain::all(mechanism)[0], fine, &[])
+        .run_with_efforts(&values, &asked, |seen| {
+            if let Simulated::Effort(seen) = seen {
+                efforts[seen.joint][seen.row] = seen.effort;
+            }
+        })
+        .unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(seed + 1000);
+    // Sum of twelve uniform numbers: normal enough.
+    let mut normal = || (0..12).map(|_| random.random_range(-0.5..0.5_f64)).sum::<f64>();
+    for (joint, effort) in joints.iter().zip(&mut efforts) {
+        for e in effort {
+            *e = match channel {
+                Channel::Current => {
+                    joint.direction * *e / joint.get(Term::TorqueConstant)
+                        + joint.get(Term::CurrentZero)
+                        + noise * normal()
+                }
+                _ => joint.direction * *e + joint.get(Term::EffortZero) + noise * normal(),
+            };
+        }
+    }
+    if channel == Channel::Current {
+        log.current = efforts;
+    } else {
+        log.effort = efforts;
+    }
     log
 }

@@ -5,7 +5,9 @@ use dynid_model::{
 };
 use dynid_servo::fit::{Block, Ending, GaussNewton, ServoProblem, deviations, fit};
 use dynid_servo::start::{StartSettings, linear_start};
-use dynid_servo::{Chain, Free, Hold, LoadOf, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
+use dynid_servo::{
+    Chain, Channel, Free, Hold, LoadOf, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term,
+};
 use dynid_testing::golden;
 use serde_json::Value;
 
@@ -120,6 +122,7 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
         sign_width: golden["w"].as_f64().unwrap(),
         load: LoadOf::Bodies,
         hold: Hold::Held,
+        ..Scheme::default()
     };
     let free: Vec<Free> = NAMES.iter().flat_map(|(_, term)| (0..2).map(|j| Free::term(*term, [j]))).collect();
     let rollout = Rollout::new(&chains[0], scheme, &free);
@@ -173,8 +176,14 @@ fn fit_is_that_of_the_prototype() {
     let time = (0..command[0].len()).map(|k| k as f64 * ts).collect();
     let mut log = ServoLog::new("golden", time, command.clone(), position);
     log.start = Some(command.iter().map(|c| c[0]).collect());
-    let scheme =
-        Scheme { step_s: ts / 4.0, sign_width: 0.01, middle: false, load: LoadOf::Bodies, hold: Hold::Held };
+    let scheme = Scheme {
+        step_s: ts / 4.0,
+        sign_width: 0.01,
+        middle: false,
+        load: LoadOf::Bodies,
+        hold: Hold::Held,
+        ..Scheme::default()
+    };
     let names = [
         "kp_1",
         "kp_2",
@@ -226,7 +235,14 @@ fn fit_is_that_of_the_prototype() {
     let rows = logs[0].rows();
     let blocks: Vec<Block> =
         (0..24).map(|b| Block { log: 0, rows: b * rows / 24..(b + 1) * rows / 24 }).collect();
-    let problem = ServoProblem { chains: &chains, logs: &logs, scheme, free: &free, blocks: &blocks };
+    let problem = ServoProblem {
+        chains: &chains,
+        logs: &logs,
+        scheme,
+        free: &free,
+        channels: &[Channel::Position],
+        blocks: &blocks,
+    };
     let fitted = fit(&problem, &start, &GaussNewton::default(), &|_| true).unwrap();
     let found = deviations(&problem, &fitted);
     assert_eq!(fitted.ending, Ending::Converged);

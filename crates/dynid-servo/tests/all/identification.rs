@@ -124,6 +124,12 @@ fn light_links_leave_one_scale_open_and_their_ratios_known() {
     });
     settings.step_s = Some(PERIOD * 1.01);
     let found = identify(&mechanism, &[log], &settings).unwrap();
+    // What is told is the share of the known bodies: the interval reaches farther up than down, and holds the truth.
+    let gain = &found.parameters[0];
+    assert_eq!(gain.free.as_term(), Some(Term::PositionGain));
+    let (lower, upper) = gain.interval.unwrap();
+    assert!(upper - gain.value > 1.02 * (gain.value - lower), "{gain:?}");
+    assert!((lower..=upper).contains(&truth[0].get(Term::PositionGain)), "{gain:?}");
     for (joint, true_joint) in truth.iter().enumerate() {
         let of = |term: Term| {
             found
@@ -179,4 +185,39 @@ fn directions_that_gravity_tells_are_found() {
     assert_eq!(found.values.joints.iter().map(|j| j.direction).collect::<Vec<_>>(), [1.0, -1.0]);
     assert!(found.directions.iter().all(|d| d.other > 2.0), "{:?}", found.directions);
     assert!(found.misfit < 1.1, "{}", found.misfit);
+}
+
+#[test]
+fn spikes_of_readings_and_efforts_change_nothing() {
+    let mechanism = arm(1.0);
+    let truth = drives(&mut ChaCha8Rng::seed_from_u64(9));
+    let good = crate::arm::log_with_efforts(
+        &mechanism,
+        &truth,
+        scheme(PERIOD),
+        (2000, 9),
+        (dynid_servo::Channel::Effort, dynid_servo::EffortAt::Drive, 0.05),
+    );
+    let mut spiked = good.clone();
+    for row in (50..2000).step_by(97) {
+        spiked.position[0][row] = 0.0;
+        spiked.position[1][row + 3] += 3.0;
+        spiked.effort[0][row + 7] = 300.0;
+    }
+    // The step of the encoder is that of good readings.
+    spiked.resolution = vec![0.0; 2];
+    let found = spiked.leave_out_spikes().unwrap();
+    assert_eq!(found, [(0, 20), (1, 21)]);
+    assert_eq!(spiked.resolution, good.resolution);
+    let settings = settings(&truth, &[Addition::Zero]);
+    let with = identify(&mechanism, &[spiked], &settings).unwrap();
+    let without = identify(&mechanism, &[good], &settings).unwrap();
+    assert!(with.misfit < 1.1, "{}", with.misfit);
+    let outliers: usize = with.outliers.iter().map(|o| o.rows).sum();
+    assert!((19..=24).contains(&outliers), "{:?}", with.outliers);
+    assert!(without.outliers.iter().map(|o| o.rows).sum::<usize>() <= 2, "{:?}", without.outliers);
+    for (a, b) in with.parameters.iter().zip(&without.parameters) {
+        let half = a.half_width.unwrap_or(f64::INFINITY);
+        assert!((a.value - b.value).abs() < half, "{a:?} {b:?}");
+    }
 }

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 mod arm;
+mod efforts;
 mod golden;
 mod identification;
 mod motion;

@@ -16,7 +16,7 @@ use dynid_linalg::Mat;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_motion::trajectory::FourierBasis;
 use dynid_servo::forecast::{ServoForecast, forecast};
-use dynid_servo::{Chain, Free, Scheme, ServoJoint, ServoLog, ServoSettings, ServoValues, Term};
+use dynid_servo::{Chain, Free, Measured, Scheme, ServoJoint, ServoLog, ServoSettings, ServoValues, Term};
 
 use super::config::{CriterionName, DesignConfig};
 use super::limits::joint_limits;
@@ -110,7 +110,7 @@ impl Drives {
         let sigma = noise(config, found, &joints, &slides, &mut warnings)?;
         let chains = Chain::all(&robot.mechanism);
         Ok(Drives {
-            free: settings.free(&chains, &laws),
+            free: settings.free(&chains, &laws, &Measured::none(settings.joints.len())),
             chains,
             scheme: Scheme {
                 step_s: settings.step_s.unwrap_or(1.1 / rate_hz),
@@ -118,6 +118,8 @@ impl Drives {
                 middle: true,
                 load: settings.load,
                 hold: settings.hold,
+                effort_at: settings.effort_at,
+                effort_span_s: 1.0 / rate_hz,
             },
             values: ServoValues { joints: settings.joints, inertias: robot.mechanism.inertia_vector() },
             sigma,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use dynid_io::MappingSpec;
 use dynid_io::columns::SignalSpec;
-use dynid_servo::{Addition, Choice, Hold, Limited, LoadOf, ServoSettings, Shared, Term};
+use dynid_servo::{Addition, Channel, Choice, EffortAt, Hold, Limited, LoadOf, ServoSettings, Shared, Term};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -25,12 +25,16 @@ pub struct ServoConfig {
     pub lock: BTreeMap<String, f64>,
     /// Gravity in base axes, m/s². Default: the robot file's.
     pub gravity: Option<[f64; 3]>,
-    /// Columns of all logs: positions, time, names, units. A log may bring its own.
+    /// Columns of all logs: positions, time, efforts and velocities where there are any, names, units. A log may bring its own.
     #[serde(skip_serializing)]
     pub columns: MappingSpec,
     /// Columns of what the drives are told.
     #[serde(skip_serializing)]
     pub command: CommandColumns,
+    /// Columns of measured currents, A unless a unit is stated. Torque constants are found, or stated in `[servo]`. Default: the columns that bear the usual names,
+    /// in logs without efforts.
+    #[serde(skip_serializing)]
+    pub current: Option<SignalSpec>,
     /// Logs to identify from.
     pub log: Vec<ServoLogConfig>,
     /// Logs that are predicted only.
@@ -93,9 +97,18 @@ pub struct DriveConfig {
     pub gain_error: f64,
     /// Whether position gains that are not known are one number or one per joint. Default `shared`.
     pub gains: GainSharing,
-    /// Velocity gains where they are known, N m s/rad. Default 0: the viscous friction that is found holds the drive's damping too.
+    /// Velocity gains where they are known, N m s/rad. Default: found where efforts of the drive are measured, else 0, and the viscous friction that is
+    /// found holds the drive's damping too.
     #[serde(skip_serializing_if = "PerJoint::is_none")]
     pub velocity_gain: PerJoint,
+    /// What the sum of squares holds beside positions, each weighted by its own noise, where logs measure it: `effort`, `current`, `velocity`. Default
+    /// `effort` and `current`, as far as they are those of the drives that the positions tell; `[]`: positions alone.
+    pub fit: Vec<ChannelName>,
+    /// Where efforts are measured. Default `drive`.
+    pub effort_at: EffortAtName,
+    /// Effort per measured current behind the gear, where it is known, N m/A. Default: found.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub torque_constant: PerJoint,
     /// Largest effort of the drives, N m. Default: none.
     #[serde(skip_serializing_if = "PerJoint::is_none")]
     pub effort_limit: PerJoint,
@@ -138,6 +151,9 @@ impl Default for DriveConfig {
             gain_error: 0.1,
             gains: GainSharing::Shared,
             velocity_gain: PerJoint::default(),
+            fit: vec![ChannelName::Effort, ChannelName::Current],
+            effort_at: EffortAtName::Drive,
+            torque_constant: PerJoint::default(),
             effort_limit: PerJoint::default(),
             limited: LimitedName::Whole,
             direction: PerJoint::default(),
@@ -154,6 +170,29 @@ impl Default for DriveConfig {
             blocks: 24,
         }
     }
+}
+
+/// What a sum of squares may hold beside positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChannelName {
+    /// Measured efforts.
+    Effort,
+    /// Measured currents.
+    Current,
+    /// Measured velocities, of columns that `[columns]` states or that bear the usual names. Filters of theirs are not modelled.
+    Velocity,
+}
+
+/// Where efforts are measured.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EffortAtName {
+    /// At the drive, as a current tells it: rotor and friction come behind it.
+    #[default]
+    Drive,
+    /// Between gear and link, where a joint torque sensor sits.
+    Link,
 }
 
 /// Whether position gains are one number.
@@ -360,6 +399,7 @@ impl DriveConfig {
         let gain = s.position_gain.positive("servo.position_gain", &names)?;
         let damping = s.velocity_gain.not_negative("servo.velocity_gain", &names)?;
         let limit = s.effort_limit.positive("servo.effort_limit", &names)?;
+        let constant = s.torque_constant.positive("servo.torque_constant", &names)?;
         let direction = s.direction.finite("servo.direction", &names)?;
         let zero = s.zero.finite("servo.zero", &names)?;
         let delay = s.delay.not_negative("servo.delay", &names)?;
@@ -368,6 +408,7 @@ impl DriveConfig {
                 (Term::PositionGain, gain[j]),
                 (Term::VelocityGain, damping[j]),
                 (Term::EffortLimit, limit[j]),
+                (Term::TorqueConstant, constant[j]),
                 (Term::Zero, zero[j]),
                 (Term::Delay, delay[j]),
             ];
@@ -394,6 +435,8 @@ impl DriveConfig {
             }
             out.find_direction[j] = s.find_directions && direction[j].is_none();
             out.known_gain[j] = gain[j].is_some();
+            out.known_damping[j] = damping[j].is_some();
+            out.known_constant[j] = constant[j].is_some();
             out.known_zero[j] = zero[j].is_some();
         }
         out.known_delay = match delay.iter().filter(|d| d.is_some()).count() {
@@ -405,6 +448,11 @@ impl DriveConfig {
             }
         };
         out.gain_error = s.gain_error;
+        out.channels = s.fit.iter().map(|c| c.channel()).collect();
+        out.effort_at = match s.effort_at {
+            EffortAtName::Drive => EffortAt::Drive,
+            EffortAtName::Link => EffortAt::Link,
+        };
         out.own_gains = s.gains == GainSharing::Own;
         out.delay = match s.delays {
             DelaySharing::All => Shared::All,
@@ -427,6 +475,16 @@ impl DriveConfig {
         out.step_s = s.step_s;
         out.blocks = s.blocks;
         Ok(out)
+    }
+}
+
+impl ChannelName {
+    fn channel(self) -> Channel {
+        match self {
+            ChannelName::Effort => Channel::Effort,
+            ChannelName::Current => Channel::Current,
+            ChannelName::Velocity => Channel::Velocity,
+        }
     }
 }
 

@@ -6,7 +6,8 @@ use std::path::Path;
 use dynid_export::Source;
 use dynid_io::mjcf::{self, JointParameters};
 use dynid_io::urdf::{self, JointDynamics};
-use dynid_servo::{ServoJoint, Term};
+use dynid_servo::identify::EffortUse;
+use dynid_servo::{Channel, ServoJoint, Term};
 use serde_json::{Value, json};
 
 use super::ServoResult;
@@ -187,6 +188,10 @@ impl ServoResult {
     }
 
     fn table(&self, names: &[String]) -> Value {
+        let told_constant = |name: &str| {
+            let told = |e: &&EffortUse| e.channel == Channel::Current && e.verdict.is_taken();
+            self.found.efforts.iter().filter(told).any(|e| names[e.joint] == name)
+        };
         let rows: Vec<Value> = names
             .iter()
             .zip(&self.found.values.joints)
@@ -208,6 +213,7 @@ impl ServoResult {
                     "dead_band": j.get(Term::DeadBand),
                     "rate_limit": finite(Term::RateLimit),
                     "smoothing_time": j.get(Term::SmoothingTime),
+                    "torque_constant": told_constant(name).then(|| j.get(Term::TorqueConstant)),
                     "zero": j.get(Term::Zero),
                     "direction": j.direction,
                 })
@@ -217,7 +223,7 @@ impl ServoResult {
             "schema": 1,
             "robot": self.robot.file.description.name,
             "about": "effort = stiffness (direction command + zero - q) - damping dq; friction, armature and offset act against it; command \
-                      delayed; units N m, rad, s, for joints that slide N, m, s",
+                      delayed; units N m, rad, s, for joints that slide N, m, s; torque_constant in N m/A",
             "joints": rows,
         })
     }

@@ -1,11 +1,12 @@
 //! Logs of commands and positions from files.
 
-use dynid_io::columns::{ColumnNames, EffortColumn, FullSignal, SignalSpec};
-use dynid_io::{MappingSpec, Signals};
-use dynid_servo::ServoLog;
+use dynid_io::columns::{ColumnNames, EffortColumn, FullSignal, MappingError, SignalSpec};
+use dynid_io::{ColumnMapping, MappingSpec, Signals};
+use dynid_servo::identify::ServoError;
+use dynid_servo::{Channel, ServoLog};
 
 use super::ServoFault;
-use super::config::{CommandColumns, ServoConfig, ServoLogConfig};
+use super::config::{ChannelName, CommandColumns, ServoConfig, ServoLogConfig};
 use crate::Error;
 use crate::estimate::InputRecord;
 use crate::log::LogAxis;
@@ -42,6 +43,8 @@ pub(super) struct ReadLog {
     pub(super) not_logged: Vec<String>,
     pub(super) inputs: Vec<InputRecord>,
     pub(super) warnings: Vec<String>,
+    /// Columns of efforts or currents that the run states and this log does not have.
+    pub(super) without: Vec<(Channel, Error)>,
 }
 
 /// Gap of the clock, in periods, behind which a rollout begins anew.
@@ -61,6 +64,7 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
         allow_unlogged: true,
         allow_no_effort: true,
         effort: None,
+        current_gains: None,
         ..columns.clone()
     };
     let own = crate::config::LogConfig { columns: None, ..plain.clone() };
@@ -98,6 +102,21 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
         let told = MappingSpec { effort: effort.clone(), allow_no_effort: false, ..plain_columns };
         efforts = with(told, &driven)?.effort.unwrap_or_default();
     }
+    let mut seen = Measurements {
+        file: &file,
+        config,
+        own: &own,
+        columns,
+        shared: log.columns.is_none(),
+        joints: &logged,
+        rows: measured.time.len(),
+        warnings: Vec::new(),
+        without: Vec::new(),
+    };
+    let measured_effort = seen.effort()?;
+    let measured_current = seen.current(measured_effort.is_empty())?;
+    let measured_velocity = seen.velocity()?;
+    let (mut warnings, without) = (seen.warnings, seen.without);
     let positions = &measured.position;
     for ((name, u), x) in names.iter().zip(&command).zip(positions) {
         let (told, done) = (spread(u), spread(x));
@@ -111,7 +130,6 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
             .into());
         }
     }
-    let mut warnings = Vec::new();
     let part = part_of(&measured.time, plain.part);
     let keep: Vec<usize> = growing(&measured.time[part.clone()]).iter().map(|k| k + part.start).collect();
     if keep.len() < part.len() {
@@ -124,6 +142,16 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
     let mut out = ServoLog::new(label, pick(&measured.time), picked(&command), picked(positions));
     out.velocity_command = picked(&velocities);
     out.feed_forward = picked(&efforts);
+    out.effort = picked(&measured_effort);
+    out.current = picked(&measured_current);
+    out.velocity = picked(&measured_velocity);
+    let spikes = out.leave_out_spikes();
+    let spikes =
+        spikes.map_err(|source| ServoFault::Fit(ServoError::Signal { log: out.name.clone(), source }))?;
+    for (j, count) in spikes {
+        let joint = names[j];
+        warnings.push(format!("{file}: spikes in the position of {joint} are left out, {count} readings"));
+    }
     let period = out.period();
     out.breaks = (1..out.rows()).filter(|k| out.time[*k] - out.time[k - 1] > GAP * period).collect();
     if !out.breaks.is_empty() {
@@ -132,7 +160,129 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
             "{file}: {gaps} gaps of more than {GAP} periods: the simulation begins anew behind each"
         ));
     }
-    Ok(ReadLog { log: out, not_logged, inputs: vec![input], warnings })
+    Ok(ReadLog { log: out, not_logged, inputs: vec![input], warnings, without })
+}
+
+/// Reads what a log measures beside positions.
+struct Measurements<'a> {
+    file: &'a str,
+    config: &'a ServoConfig,
+    own: &'a crate::config::LogConfig,
+    columns: &'a MappingSpec,
+    /// Whether these columns are those of all logs of the run, which need not measure the same.
+    shared: bool,
+    /// Joints that have positions.
+    joints: &'a [LogAxis],
+    /// Rows with positions.
+    rows: usize,
+    warnings: Vec<String>,
+    without: Vec<(Channel, Error)>,
+}
+
+impl Measurements<'_> {
+    /// Efforts, joint after joint; empty where the log has none, or they are not asked for.
+    fn effort(&mut self) -> Result<Vec<Vec<f64>>, Error> {
+        if !self.config.servo.fit.contains(&ChannelName::Effort) {
+            return Ok(Vec::new());
+        }
+        let columns = (self.columns.effort.clone(), self.columns.current_gains.clone());
+        self.signal(Channel::Effort, columns)
+    }
+
+    /// Currents, alike. Beside efforts they say little more, and are taken where they are stated.
+    fn current(&mut self, alone: bool) -> Result<Vec<Vec<f64>>, Error> {
+        let stated = self.config.current.clone();
+        if !self.config.servo.fit.contains(&ChannelName::Current) || (stated.is_none() && !alone) {
+            return Ok(Vec::new());
+        }
+        let gains = stated.is_none().then(|| vec![1.0; self.joints.len()]);
+        self.signal(Channel::Current, (stated.map(amperes), gains))
+    }
+
+    /// Efforts by a mapping; with gains currents that bear the usual names. What is not stated may be missing.
+    fn signal(
+        &mut self,
+        channel: Channel,
+        (effort, current_gains): (Option<SignalSpec>, Option<Vec<f64>>),
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let stated = effort.is_some() || (current_gains.is_some() && self.columns.current_gains.is_some());
+        let axes: Vec<LogAxis> =
+            self.joints.iter().map(|a| LogAxis { effort: EffortColumn::Drive, ..a.clone() }).collect();
+        let spec = MappingSpec {
+            effort,
+            current_gains,
+            allow_no_effort: !stated,
+            allow_unlogged: false,
+            ..self.columns.clone()
+        };
+        if !stated {
+            // A look at the names, before the whole file is read again.
+            let header = dynid_io::log::open(&self.own.path, &spec.options(self.own.rows))?.header();
+            let (names, efforts): (Vec<String>, Vec<EffortColumn>) =
+                axes.iter().map(|a| (a.name.clone(), a.effort)).unzip();
+            if ColumnMapping::of_log(&header, &names, &efforts, &spec).is_ok_and(|m| m.effort.is_none()) {
+                return Ok(Vec::new());
+            }
+        }
+        match logs::positions(self.own, &axes, &spec) {
+            Ok((read, _)) if read.time.len() == self.rows => Ok(read.effort.unwrap_or_default()),
+            Ok((read, _)) => {
+                self.warnings.push(format!(
+                    "{}: efforts in {} of {} rows with positions are left out: `missing = \"interpolate\"` fills the rest",
+                    self.file,
+                    read.time.len(),
+                    self.rows
+                ));
+                Ok(Vec::new())
+            }
+            Err(error) if stated && (self.shared || channel == Channel::Current) && is_without(&error) => {
+                self.without.push((channel, error));
+                Ok(Vec::new())
+            }
+            Err(error) if stated => Err(error),
+            Err(error) => {
+                self.warnings.push(format!("{}: what looks like efforts is left out: {error}", self.file));
+                Ok(Vec::new())
+            }
+        }
+    }
+
+    fn velocity(&self) -> Result<Vec<Vec<f64>>, Error> {
+        if !self.config.servo.fit.contains(&ChannelName::Velocity) {
+            return Ok(Vec::new());
+        }
+        let axes: Vec<LogAxis> =
+            self.joints.iter().map(|a| LogAxis { effort: EffortColumn::Absent, ..a.clone() }).collect();
+        let spec = MappingSpec {
+            effort: None,
+            current_gains: None,
+            allow_no_effort: true,
+            allow_unlogged: false,
+            ..self.columns.clone()
+        };
+        let (read, _) = logs::positions(self.own, &axes, &spec)?;
+        match read.velocity {
+            Some(velocity) if read.time.len() == self.rows => Ok(velocity),
+            _ => Err(ServoFault::NoVelocity { file: self.file.to_owned() }.into()),
+        }
+    }
+}
+
+/// Whether an error says that a log does not have columns that were stated.
+fn is_without(error: &Error) -> bool {
+    matches!(error, Error::Columns { source, .. } if matches!(**source, MappingError::UnknownColumn { .. }))
+}
+
+/// Columns of currents: in A where nothing else is stated.
+fn amperes(spec: SignalSpec) -> SignalSpec {
+    let ones = || Some(dynid_io::columns::PerJoint::One(1.0));
+    SignalSpec::Full(match spec {
+        SignalSpec::Names(columns) => {
+            let unit = Some(dynid_io::columns::Units::One("A".to_owned()));
+            FullSignal { columns, unit, scale: ones(), offset: None }
+        }
+        SignalSpec::Full(full) => FullSignal { scale: full.scale.clone().or_else(ones), ..full },
+    })
 }
 
 /// Rows of a part of a record, stated as shares.

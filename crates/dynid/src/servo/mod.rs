@@ -16,8 +16,9 @@ pub(crate) use files::stated;
 pub(crate) use found::{FoundDrives, set_terms};
 pub(crate) use record::member;
 pub use record::{
-    AdditionRecord, DirectionRecord, HorizonRecord, ServoFile, ServoFit, ServoGroupKind, ServoGroupRecord,
-    ServoLaw, ServoLogFit, ServoParameterRecord, ServoSimulation, ServoSpread, ServoVerdict,
+    AdditionRecord, DirectionRecord, HorizonRecord, ServoEffortRecord, ServoEffortVerdict, ServoFile,
+    ServoFit, ServoGroupKind, ServoGroupRecord, ServoLaw, ServoLogFit, ServoParameterRecord, ServoSimulation,
+    ServoSpread, ServoVerdict,
 };
 
 use std::collections::BTreeMap;
@@ -25,7 +26,7 @@ use std::path::Path;
 
 use dynid_servo::fit::{Evaluation, ServoProblem, blocks};
 use dynid_servo::identify::{LEAST_ROWS, ServoError, ServoIdentification, identify};
-use dynid_servo::{Chain, ServoLog, ServoSettings, ServoValues, Term};
+use dynid_servo::{Channel, ServoLog, ServoSettings, ServoValues, Simulated, Term};
 
 use crate::estimate::InputRecord;
 use crate::robot::{Robot, RobotOptions, refuse_elastic, refuse_loops};
@@ -83,6 +84,12 @@ pub enum ServoFault {
         /// Rows with positions.
         positions: usize,
     },
+    /// Velocities that were asked for.
+    #[error("{file}: no columns of velocities in the rows with positions, which `fit` asks for")]
+    NoVelocity {
+        /// Log.
+        file: String,
+    },
     /// No joint is left that moves.
     #[error("{robot}: no joint that moves and has columns in the log")]
     NoJoint {
@@ -114,6 +121,10 @@ impl Fault for ServoFault {
             }
             ServoFault::Rows { .. } => "give commands and positions on the same rows, or `missing = \"drop\"`".to_owned(),
             ServoFault::NoPosition { .. } => "leave the log out, or lock the joint: `lock = { JOINT = 0.0 }`".to_owned(),
+            ServoFault::NoVelocity { .. } => {
+                "name them in the configuration, e.g. `[columns]` with `velocity = \"dq_{joint}\"`, or leave `\"velocity\"` out of `fit`"
+                    .to_owned()
+            }
             ServoFault::NoJoint { .. } => "name the columns of positions: `[columns]` with `position`".to_owned(),
             ServoFault::File { .. } => "give the `servo.json` of the output folder of `dynid servo`".to_owned(),
             ServoFault::Fit(ServoError::Lost(_)) => {
@@ -197,6 +208,7 @@ pub fn identify_servo(
             return Err(ServoFault::Fit(ServoError::Short { log, expected: LEAST_ROWS, found }).into());
         }
     }
+    warnings.extend(refuse_without(&mut training)?);
     for log in training.iter().chain(&validation) {
         warnings.extend(log.warnings.iter().cloned());
         inputs.extend(log.inputs.iter().cloned());
@@ -208,12 +220,19 @@ pub fn identify_servo(
     }
     let period = logs.iter().map(ServoLog::period).fold(0.0, f64::max);
     let settings = config.servo.settings(&robot, period)?;
+    refuse_idle(config, &logs)?;
     progress(ServoStep::Fit);
     let found = identify(&robot.mechanism, &logs, &settings).map_err(ServoFault::from)?;
     let rms = |values: &ServoValues, logs: &[ServoLog]| -> Option<Vec<Vec<f64>>> {
         let whole = blocks(logs, logs.len());
-        let problem =
-            ServoProblem { chains: &found.chains, logs, scheme: found.scheme, free: &[], blocks: &whole };
+        let problem = ServoProblem {
+            chains: &found.chains,
+            logs,
+            scheme: found.scheme,
+            free: &[],
+            channels: &[Channel::Position],
+            blocks: &whole,
+        };
         let evaluation = Evaluation::new(&problem, values, &vec![1.0; values.joints.len()], false).ok()?;
         let of = |l: usize| {
             let squares = evaluation.mean_squares(&|b| whole[b].log == l);
@@ -228,6 +247,51 @@ pub fn identify_servo(
         .and_then(|values| rms(&values, &logs))
         .map(|by_log| over_logs(&by_log, &logs));
     Ok(ServoResult { robot, logs, validation, settings, found, validation_rms, as_it_came, warnings, inputs })
+}
+
+/// Logs need not all measure efforts or currents that the run states columns for; that none does is a fault. Returns what to say of the others.
+fn refuse_without(logs: &mut [logs::ReadLog]) -> Result<Vec<String>, Error> {
+    let mut out = Vec::new();
+    for channel in [Channel::Effort, Channel::Current] {
+        let has = |log: &ServoLog| (0..log.joints()).any(|j| log.measured(channel, j).is_some());
+        let any = logs.iter().any(|l| has(&l.log));
+        let mut names = Vec::new();
+        for log in logs.iter_mut() {
+            while let Some(at) = log.without.iter().position(|w| w.0 == channel) {
+                let (_, error) = log.without.remove(at);
+                if !any {
+                    return Err(error);
+                }
+                names.push(log.log.name.clone());
+            }
+        }
+        if !names.is_empty() {
+            out.push(format!("no columns of {}s in {}", channel.name(), names.join(", ")));
+        }
+    }
+    Ok(out)
+}
+
+/// Refuses what is said of measured efforts where no log has any.
+fn refuse_idle(config: &ServoConfig, logs: &[ServoLog]) -> Result<(), Error> {
+    let has = |channel| logs.iter().any(|log| (0..log.joints()).any(|j| log.measured(channel, j).is_some()));
+    let (effort, current) = (has(Channel::Effort), has(Channel::Current));
+    let idle = [
+        (
+            "servo.torque_constant",
+            !config.servo.torque_constant.is_none() && !current,
+            "a log with columns of currents, e.g. `current = \"i_{joint}\"`",
+        ),
+        (
+            "servo.effort_at",
+            config.servo.effort_at != config::EffortAtName::Drive && !effort && !current,
+            "a log with columns of efforts, e.g. `[columns]` with `effort = \"tau_{joint}\"`",
+        ),
+    ];
+    match idle.iter().find(|(_, found, _)| *found) {
+        Some((key, _, expected)) => Err(Error::setting(key, expected, "none")),
+        None => Ok(()),
+    }
 }
 
 /// RMS over all rows from that by log.
@@ -288,15 +352,27 @@ fn file_values(robot: &Robot, settings: &ServoSettings) -> Result<Option<ServoVa
     Ok(Some(ServoValues { joints, inertias: robot.mechanism.inertia_vector() }))
 }
 
-/// Simulated readings of a log, joint after joint.
-pub(super) fn simulated(chains: &[Chain], found: &ServoIdentification, log: &ServoLog) -> Vec<Vec<f64>> {
-    let mut out = vec![vec![f64::NAN; log.rows()]; log.joints()];
-    for chain in chains {
+/// Simulated readings of a log, joint after joint, and the efforts of the drives where the log measures an effort or current.
+pub(super) struct SimulatedLog {
+    pub(super) reading: Vec<Vec<f64>>,
+    pub(super) effort: Vec<Vec<f64>>,
+}
+
+pub(super) fn simulated(found: &ServoIdentification, log: &ServoLog) -> SimulatedLog {
+    let nothing = || vec![vec![f64::NAN; log.rows()]; log.joints()];
+    let mut out = SimulatedLog { reading: nothing(), effort: nothing() };
+    for chain in &found.chains {
         let rollout = dynid_servo::Rollout::new(chain, found.scheme, &[]);
         // What gets lost shows as a gap.
-        let _lost = rollout.run(&found.values, log, |row| {
-            for (k, j) in chain.joints.iter().enumerate() {
-                out[*j][row.row] = row.reading[k];
+        let _lost = rollout.run_with_efforts(&found.values, log, |seen| match seen {
+            Simulated::Row(row) => {
+                for (k, j) in chain.joints.iter().enumerate() {
+                    out.reading[*j][row.row] = row.reading[k];
+                }
+            }
+            Simulated::Effort(seen) => {
+                let j = chain.joints[seen.joint];
+                out.effort[j][seen.row] = found.values.joints[j].direction * seen.effort;
             }
         });
     }

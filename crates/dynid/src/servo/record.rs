@@ -6,8 +6,8 @@ use std::path::Path;
 use dynid_io::SourceFile;
 use dynid_record::{Outcome, words};
 use dynid_servo::fit::Ending;
-use dynid_servo::identify::{GroupKind, MISFIT, ServoGroup, ServoParameter, TOLD_DIRECTION};
-use dynid_servo::{Addition, Free, Hold, LoadOf, Term};
+use dynid_servo::identify::{EffortUse, GroupKind, MISFIT, ServoGroup, ServoParameter, TOLD_DIRECTION};
+use dynid_servo::{Addition, Channel, Free, Hold, LoadOf, Term};
 use serde::{Deserialize, Serialize};
 
 use super::config::{DriveConfig, ServoConfig};
@@ -49,6 +49,22 @@ words! {
     }
 }
 
+words! {
+    /// What a measured effort is beside that of a fit to positions alone.
+    ServoEffortVerdict {
+        /// It is that of the drive, and the fit takes it.
+        Taken = "taken",
+        /// The fit takes it, and its size is not what positions, masses and stated gains ask for.
+        OtherSize = "other size",
+        /// It runs against the drive, and is left out.
+        Against = "other sign",
+        /// It has no sign, and is left out.
+        Unsigned = "no sign",
+        /// The simulation explains less than half of its variance, and it is left out.
+        Unlike = "unlike",
+    }
+}
+
 /// The output of `dynid servo`.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ServoFile {
@@ -56,7 +72,7 @@ pub struct ServoFile {
     pub schema: u32,
     /// Robot.
     pub robot: String,
-    /// The result in a word: `pass`, `warn` where the model is wrong or a parameter not told, `fail` where it predicts no better than the
+    /// The result in a word: `pass`, `warn` where the model is wrong, a parameter is not told or none to a tenth, or measured efforts are not those of the drives, `fail` where it predicts no better than the
     /// command itself or misses a third of the motion, no parameter is told, or the fit did not settle.
     pub status: Outcome,
     /// The result in a sentence.
@@ -92,7 +108,8 @@ pub struct ServoParameterRecord {
     pub unit: String,
     /// Value.
     pub value: f64,
-    /// 95 % interval with all spreads, within what is possible; absent where there is none.
+    /// 95 % interval with all spreads, within what is possible; absent where there is none, or no upper end. Where a scale is open, it is that of the reciprocal, and
+    /// reaches farther up than down.
     pub interval: Option<(f64, f64)>,
     /// Standard deviation by leaving out blocks of time.
     pub std: Option<f64>,
@@ -111,12 +128,15 @@ pub struct ServoParameterRecord {
 pub struct ServoSpread {
     /// Largest change under laws richer by one addition.
     pub law: f64,
-    /// Change under half the step of the simulation.
+    /// Change under half the step of the simulation; under twice the step where nothing but rounding is left of the readings.
     pub step: f64,
     /// Standard deviation over fits that leave a fold of the logs out.
     pub folds: f64,
     /// Largest change under stated gains that are wrong by their error.
     pub gain: f64,
+    /// Change with the time over which efforts are read, a period or an instant, where the logs do not tell it.
+    #[serde(default)]
+    pub reading: f64,
 }
 
 /// Parameters that are known together only.
@@ -181,6 +201,9 @@ pub struct ServoFit {
     pub misfit: Option<f64>,
     /// RMS by log.
     pub by_log: Vec<ServoLogFit>,
+    /// Efforts and currents that logs measure.
+    #[serde(default)]
+    pub efforts: Vec<ServoEffortRecord>,
     /// RMS of rollouts that begin from measured states again and again.
     pub horizons: Vec<HorizonRecord>,
     /// Relative residual of the linear start.
@@ -193,6 +216,25 @@ pub struct ServoFit {
     pub evaluations: usize,
     /// Blocks of time behind the standard deviations.
     pub blocks: usize,
+}
+
+/// A measured effort or current of a joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoEffortRecord {
+    /// Joint.
+    pub joint: String,
+    /// `effort` or `current`.
+    pub channel: String,
+    /// Unit.
+    pub unit: String,
+    /// What became of it.
+    pub verdict: ServoEffortVerdict,
+    /// Share of its variance that the simulation explains: the last fit where it is taken, else that to positions alone, scale and zero free.
+    pub explained: f64,
+    /// Measured over simulated effort of the fit to positions alone; absent for currents whose torque constant is not known.
+    pub ratio: Option<f64>,
+    /// RMS of measured less simulated; absent where it is left out.
+    pub rms: Option<f64>,
 }
 
 /// RMS of one log.
@@ -296,9 +338,12 @@ impl ServoResult {
         let wrong = f.misfit.is_nan() || f.misfit > MISFIT;
         let parameters: Vec<ServoParameterRecord> =
             f.parameters.iter().map(|p| self.parameter(p, &names, wrong)).collect();
-        let (status, headline) = self.verdict(&parameters);
+        // What sensors read without any effort, and when, is nobody's question.
+        let of_sensor = |p: &&ServoParameterRecord| Term::named(&p.term).is_some_and(Term::is_of_sensor);
+        let asked: Vec<ServoParameterRecord> = parameters.iter().filter(|p| !of_sensor(p)).cloned().collect();
+        let (status, headline) = self.verdict(&asked);
         let mut warnings = self.warnings.clone();
-        warnings.extend(self.doubts(&parameters));
+        warnings.extend(self.doubts(&asked));
         warnings.extend(left_out.iter().cloned());
         let logs = |logs: &[dynid_servo::ServoLog], rms: &[Vec<f64>]| -> Vec<ServoLogFit> {
             logs.iter()
@@ -347,6 +392,7 @@ impl ServoResult {
                 floor: f.floor.clone(),
                 misfit: Some(f.misfit).filter(|m| m.is_finite()),
                 by_log: logs(&self.logs, &f.rms_by_log),
+                efforts: f.efforts.iter().map(|e| self.effort(e)).collect(),
                 horizons: f
                     .horizons
                     .iter()
@@ -394,10 +440,7 @@ impl ServoResult {
             joints: joints.iter().map(|j| names[*j].clone()).collect(),
             unit: term.unit(slides).to_owned(),
             value: p.value,
-            // What cannot be is no part of an interval.
-            interval: p
-                .half_width
-                .map(|h| ((p.value - h).max(p.free.lower), (p.value + h).min(p.free.upper))),
+            interval: p.interval,
             std: p.std,
             model_std: p.model_std.filter(|_| !wrong),
             spread: ServoSpread {
@@ -405,6 +448,7 @@ impl ServoResult {
                 step: p.spread.step,
                 folds: p.spread.folds,
                 gain: p.spread.gain,
+                reading: p.spread.reading,
             },
             per_gain: p.per_gain,
             verdict: match p.verdict {
@@ -415,6 +459,31 @@ impl ServoResult {
                 V::AtBound => ServoVerdict::AtBound,
                 V::NotSeen => ServoVerdict::NotSeen,
             },
+        }
+    }
+
+    fn effort(&self, e: &EffortUse) -> ServoEffortRecord {
+        use dynid_servo::identify::EffortVerdict as V;
+        let slides = self.robot.mechanism.effort_units().get(e.joint) == Some(&"N");
+        let unit = match (e.channel, slides) {
+            (Channel::Current, _) => "A",
+            (_, true) => "N",
+            _ => "N m",
+        };
+        ServoEffortRecord {
+            joint: self.robot.rate_names()[e.joint].clone(),
+            channel: e.channel.name().to_owned(),
+            unit: unit.to_owned(),
+            verdict: match e.verdict {
+                V::Taken => ServoEffortVerdict::Taken,
+                V::OtherSize => ServoEffortVerdict::OtherSize,
+                V::Against => ServoEffortVerdict::Against,
+                V::Unsigned => ServoEffortVerdict::Unsigned,
+                V::Unlike => ServoEffortVerdict::Unlike,
+            },
+            explained: e.explained,
+            ratio: e.ratio,
+            rms: Some(e.rms).filter(|x| x.is_finite()),
         }
     }
 
@@ -469,7 +538,9 @@ impl ServoResult {
         let bad = |p: &&ServoParameterRecord| {
             !matches!(p.verdict, ServoVerdict::Seen | ServoVerdict::Coarse | ServoVerdict::Prior)
         };
-        let status = if parameters.iter().any(|p| bad(&p)) { Outcome::Warn } else { Outcome::Pass };
+        let odd = f.efforts.iter().any(|e| e.verdict != dynid_servo::identify::EffortVerdict::Taken);
+        let warns = odd || told == 0 || parameters.iter().any(|p| bad(&p));
+        let status = if warns { Outcome::Warn } else { Outcome::Pass };
         (status, headline)
     }
 
@@ -482,6 +553,38 @@ impl ServoResult {
             (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / rows).sqrt()
         };
         (0..self.settings.joints.len()).map(of).collect()
+    }
+
+    /// Measured efforts that are not those of the drives.
+    fn doubts_of_efforts(&self) -> Vec<String> {
+        use dynid_servo::identify::EffortVerdict as V;
+        let f = &self.found;
+        let names = self.robot.rate_names();
+        let named = |verdict: V, more: &dyn Fn(&EffortUse) -> String| -> Vec<String> {
+            let of = f.efforts.iter().filter(|e| e.verdict == verdict);
+            of.map(|e| format!("{} of {}{}", e.channel.name(), names[e.joint], more(e))).collect()
+        };
+        let ratio = |e: &EffortUse| e.ratio.map_or(String::new(), |r| format!(" ({r:.2} times)"));
+        let explained = |e: &EffortUse| format!(" ({:.0} % explained)", 100.0 * e.explained);
+        let none = |_: &EffortUse| String::new();
+        let all = [
+            (
+                named(V::OtherSize, &ratio),
+                "are not the size that positions, masses of the robot file and stated gains ask for; one of these, the unit, the gear ratio or \
+                 `effort_at` is wrong, and all that is in N m with it",
+            ),
+            (
+                named(V::Against, &none),
+                "run against the drives and are left out: turn them, `effort = { columns = ..., scale = -1 }`",
+            ),
+            (named(V::Unsigned, &none), "have no sign and are left out"),
+            (
+                named(V::Unlike, &explained),
+                "are not what moves the joints and are left out: other columns, or too little motion",
+            ),
+        ];
+        let told = all.into_iter().filter(|(names, _)| !names.is_empty());
+        told.map(|(names, what)| format!("{} {what}", names.join(", "))).collect()
     }
 
     /// What a reader has to know before using the numbers.
@@ -512,6 +615,14 @@ impl ServoResult {
                 untold.join(", ")
             ));
         }
+        for o in &f.outliers {
+            let (log, joint, channel) = (&self.logs[o.log].name, &names[o.joint], o.channel.name());
+            let rows = o.rows;
+            out.push(format!(
+                "{log}: {rows} readings of the {channel} of {joint} stand out alone of what the fit misses and are left out"
+            ));
+        }
+        out.extend(self.doubts_of_efforts());
         if f.step_share > 0.1 {
             out.push(format!(
                 "half the step moves the simulation by {:.0} % of the residual: a smaller `step_s` would move the estimate",
@@ -542,8 +653,8 @@ impl ServoGroupRecord {
         let (kind, remedy) = match group.kind {
             GroupKind::Scale => (
                 ServoGroupKind::Scale,
-                "their ratios are known, their common scale is not: state `position_gain`, or log the same motion with a known mass \
-                 at the last link and move joints that lift it",
+                "their ratios are known, their common scale is not: state `position_gain`, log efforts or currents with a known \
+                 `torque_constant`, or log the same motion with a known mass at the last link and move joints that lift it",
             ),
             GroupKind::Lag => (
                 ServoGroupKind::Lag,

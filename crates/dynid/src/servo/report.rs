@@ -2,7 +2,7 @@
 
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
-use dynid_servo::ServoLog;
+use dynid_servo::{Channel, ServoLog, Term};
 
 use super::config::ServoConfig;
 use super::record::{ServoFile, ServoParameterRecord, ServoVerdict};
@@ -24,15 +24,24 @@ impl ServoResult {
     pub fn report(&self, file: &ServoFile) -> Result<String, Error> {
         let p = &file.provenance;
         let shown = self.validation.first().or(self.logs.first());
-        let curves = shown.map(|log| simulated(&self.found.chains, &self.found, log));
+        let curves = shown.map(|log| simulated(&self.found, log));
+        // Efforts are shown of the first log that measures any.
+        let with_efforts = self.validation.iter().chain(&self.logs).find(|log| {
+            let channels = [Channel::Effort, Channel::Current];
+            (0..log.joints()).any(|j| channels.into_iter().any(|c| log.measured(c, j).is_some()))
+        });
+        let efforts = with_efforts.map(|log| simulated(&self.found, log).effort);
         let mut sections = Vec::with_capacity(file.joints.len());
         for (j, joint) in file.joints.iter().enumerate() {
             let slides = self.robot.mechanism.effort_units().get(j) == Some(&"N");
             let unit = if slides { "m" } else { "rad" };
-            let charts = match (shown, &curves) {
-                (Some(log), Some(curves)) => charts(log, &curves[j], j, unit),
+            let mut charts = match (shown, &curves) {
+                (Some(log), Some(curves)) => charts(log, &curves.reading[j], j, unit),
                 _ => Vec::new(),
             };
+            if let (Some(log), Some(efforts)) = (with_efforts, &efforts) {
+                charts.extend(self.effort_chart(log, &efforts[j], j));
+            }
             sections.push(section(file, j, joint, unit, charts));
         }
         crate::fault::page(report::render_joints(&report::JointsReport {
@@ -53,7 +62,7 @@ impl ServoResult {
                 file: Some(self.robot.path.display().to_string()),
                 ..report::Robot::default()
             },
-            introduction: introduction(),
+            introduction: introduction(file),
             counted: None,
             overview: Some(whole(file)),
             joints: sections,
@@ -78,15 +87,47 @@ impl ServoResult {
     }
 }
 
-fn introduction() -> Vec<String> {
+impl ServoResult {
+    /// Measured effort of a joint beside that of the simulation, as the sensor would read it.
+    fn effort_chart(&self, log: &ServoLog, effort: &[f64], j: usize) -> Option<Chart> {
+        let joint = &self.found.values.joints[j];
+        let slides = self.robot.mechanism.effort_units().get(j) == Some(&"N");
+        let (channel, unit, scale, zero) = match log.measured(Channel::Effort, j) {
+            Some(_) => (Channel::Effort, if slides { "N" } else { "N m" }, 1.0, joint.get(Term::EffortZero)),
+            None => (Channel::Current, "A", joint.get(Term::TorqueConstant), joint.get(Term::CurrentZero)),
+        };
+        let measured = log.measured(channel, j)?;
+        let read: Vec<f64> = effort.iter().map(|e| e / scale + zero).collect();
+        let all = [("measured", measured), ("simulated", &read)];
+        Some(chart(
+            log,
+            (format!("{} in {}", capitalised(channel.name()), log.name), String::new()),
+            (channel.name(), unit),
+            &all,
+        ))
+    }
+}
+
+fn capitalised(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn introduction(file: &ServoFile) -> Vec<String> {
+    let hangs = if file.fit.efforts.iter().any(|e| e.rms.is_some()) {
+        "Efforts or currents were measured, and are met together with the positions, each weighted by its own noise; bodies are those of the \
+         robot file."
+    } else {
+        "No effort was measured: everything in N m hangs on the masses of the robot file and on stated gains."
+    };
     vec![
         "The robot is simulated in closed loop along the logged commands: `τ = k_p (s u + z - q) - k_d v` behind a delay, against rotor \
          inertia, friction and the bodies of the robot file. The parameters are those whose simulation gives the measured positions."
             .to_owned(),
-        "Intervals are those of a jackknife over blocks of time, widened by what a value moves by under half the step of the simulation, \
-         without a fold of the logs, under richer laws and under other stated gains. No effort was measured: everything in N m hangs on \
-         the masses of the robot file and on stated gains."
-            .to_owned(),
+        format!(
+            "Intervals are those of a jackknife over blocks of time, widened by what a value moves by with the step of the simulation, \
+             without a fold of the logs, under richer laws and under other stated gains. {hangs}"
+        ),
     ]
 }
 
@@ -127,6 +168,35 @@ fn whole(file: &ServoFile) -> report::JointSection {
             })
             .collect(),
     };
+    let efforts = StudyTable {
+        caption: "Measured efforts beside simulated ones".to_owned(),
+        head: [
+            "Joint",
+            "Measured",
+            "Unit",
+            "Verdict",
+            "RMS",
+            "Explained, %",
+            "Size over that of positions alone",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+        rows: f
+            .efforts
+            .iter()
+            .map(|e| {
+                vec![
+                    text(e.joint.clone()),
+                    text(e.channel.clone()),
+                    text(e.unit.clone()),
+                    text(e.verdict.word()),
+                    Value::from(e.rms),
+                    Value::from(100.0 * e.explained),
+                    Value::from(e.ratio),
+                ]
+            })
+            .collect(),
+    };
     let trials = StudyTable {
         caption: "Additions to the law on held-out folds: error over that without it".to_owned(),
         head: ["Beside", "Addition", "Fold 1", "Fold 2", "Fold 3", "Taken"].map(str::to_owned).to_vec(),
@@ -163,8 +233,10 @@ fn whole(file: &ServoFile) -> report::JointSection {
             .map(|g| vec![text(g.kind.word()), text(g.members.join("; ")), text(g.remedy.clone())])
             .collect(),
     };
-    let tables =
-        [horizons, by_log, trials, directions, groups].into_iter().filter(|t| !t.rows.is_empty()).collect();
+    let tables = [horizons, by_log, efforts, trials, directions, groups]
+        .into_iter()
+        .filter(|t| !t.rows.is_empty())
+        .collect();
     report::JointSection {
         name: "Whole robot".to_owned(),
         status: file.status.into(),
@@ -244,7 +316,8 @@ fn parameter(p: &ServoParameterRecord) -> Vec<Value> {
         p.interval.map_or(Value::Undefined, |(a, b)| text(format!("{} to {}", digits(a), digits(b))));
     let ratio = p.per_gain.map_or(Value::Undefined, |(r, h)| text(format!("{r:.5} ± {h:.5}")));
     let s = p.spread;
-    let moves = [("law", s.law), ("step", s.step), ("folds", s.folds), ("gain", s.gain)];
+    let moves =
+        [("law", s.law), ("step", s.step), ("folds", s.folds), ("gain", s.gain), ("reading", s.reading)];
     let moves: Vec<String> =
         moves.iter().filter(|(_, x)| *x > 0.0).map(|(name, x)| format!("{name} {x:.2e}")).collect();
     vec![
@@ -259,43 +332,57 @@ fn parameter(p: &ServoParameterRecord) -> Vec<Value> {
 }
 
 fn charts(log: &ServoLog, simulated: &[f64], j: usize, unit: &str) -> Vec<Chart> {
+    let (command, position) = (&log.command[j], &log.position[j]);
+    let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+    let (of_command, of_simulation) = (less(position, command), less(position, simulated));
+    vec![
+        chart(
+            log,
+            (
+                format!("Position in {}", log.name),
+                "One rollout from the first row, nothing corrected on the way.".to_owned(),
+            ),
+            ("position", unit),
+            &[("command", command), ("measured", position), ("simulated", simulated)],
+        ),
+        chart(
+            log,
+            (
+                "Errors of prediction".to_owned(),
+                "Measured less command, and measured less simulated.".to_owned(),
+            ),
+            ("error", unit),
+            &[("command as prediction", &of_command), ("simulation", &of_simulation)],
+        ),
+    ]
+}
+
+/// Values of the first part of a log over time.
+fn chart(
+    log: &ServoLog,
+    (title, note): (String, String),
+    (label, unit): (&str, &str),
+    curves: &[(&str, &[f64])],
+) -> Chart {
     let start = log.time[0];
     let rows: Vec<usize> = (0..log.rows()).filter(|k| log.time[*k] - start <= SHOWN_S).collect();
     let every = rows.len().div_ceil(POINTS).max(1);
-    let points = |of: &dyn Fn(usize) -> f64| -> Vec<[f64; 2]> {
-        rows.iter().step_by(every).map(|k| [log.time[*k] - start, of(*k)]).collect()
-    };
-    let curve = |name: &str, of: &dyn Fn(usize) -> f64| ChartCurve {
-        name: name.to_owned(),
-        points: points(of),
+    let curve = |(name, values): &(&str, &[f64])| ChartCurve {
+        name: (*name).to_owned(),
+        points: rows.iter().step_by(every).map(|k| [log.time[*k] - start, values[*k]]).collect(),
         style: CurveStyle::Line,
     };
-    let time = ChartAxis { label: "time".to_owned(), unit: "s".to_owned(), logarithmic: false };
-    let axis = |label: &str| ChartAxis { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false };
-    let (command, position) = (&log.command[j], &log.position[j]);
-    vec![
-        Chart {
-            title: format!("Position in {}", log.name),
-            note: "One rollout from the first row, nothing corrected on the way.".to_owned(),
-            x: time.clone(),
-            y: axis("position"),
-            equal_units: false,
-            curves: vec![
-                curve("command", &|k| command[k]),
-                curve("measured", &|k| position[k]),
-                curve("simulated", &|k| simulated[k]),
-            ],
-        },
-        Chart {
-            title: "Errors of prediction".to_owned(),
-            note: "Measured less command, and measured less simulated.".to_owned(),
-            x: time,
-            y: axis("error"),
-            equal_units: false,
-            curves: vec![
-                curve("command as prediction", &|k| position[k] - command[k]),
-                curve("simulation", &|k| position[k] - simulated[k]),
-            ],
-        },
-    ]
+    let axis = |label: &str, unit: &str| ChartAxis {
+        label: label.to_owned(),
+        unit: unit.to_owned(),
+        logarithmic: false,
+    };
+    Chart {
+        title,
+        note,
+        x: axis("time", "s"),
+        y: axis(label, unit),
+        equal_units: false,
+        curves: curves.iter().map(curve).collect(),
+    }
 }

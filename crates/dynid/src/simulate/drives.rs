@@ -68,6 +68,8 @@ pub fn simulate_drives(
         middle: true,
         load: known.load,
         hold: known.hold,
+        effort_at: known.effort_at,
+        effort_span_s: 1e-3 / settings.rate_hz,
     };
     let values = ServoValues { joints: known.joints, inertias: mechanism.inertia_vector() };
     let still = || vec![vec![0.0; rows]; joints.len()];

@@ -5,8 +5,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dynid::servo::{ServoConfig, ServoFiles, ServoVerdict, identify_servo};
-use dynid::servo_fits::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
+use dynid::servo::{ServoConfig, ServoEffortVerdict, ServoFile, ServoFiles, ServoVerdict, identify_servo};
+use dynid::servo_fits::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Simulated, Term};
 use dynid::{Robot, RobotOptions};
 use tempfile::TempDir;
 
@@ -75,6 +75,50 @@ fn log(seed: f64, rows: usize) -> String {
     out
 }
 
+/// The same log with the drives' efforts and currents: `tau_*` in N m with a noise of 0.05, `i_*` at 2 and 3 N m/A with one of 0.02.
+pub(crate) fn log_with_efforts(seed: f64, rows: usize) -> String {
+    let plain = log(seed, rows);
+    let locked = vec![("finger".to_owned(), 0.0)];
+    let options = RobotOptions { locked, ..RobotOptions::default() };
+    let robot = Robot::parse(ARM, Path::new("arm.urdf"), &options).unwrap();
+    let parsed: Vec<Vec<f64>> =
+        plain.lines().skip(1).map(|l| l.split(',').map(|c| c.parse().unwrap()).collect()).collect();
+    let column = |c: usize| parsed.iter().map(|row| row[c]).collect::<Vec<f64>>();
+    let command = vec![column(1), column(2)];
+    let mut asked = ServoLog::new("log", column(0), command.clone(), command.clone());
+    asked.start = Some(command.iter().map(|c| c[0]).collect());
+    asked.effort = command;
+    let values = ServoValues { joints: truth(), inertias: robot.mechanism.inertia_vector() };
+    let mut efforts = vec![vec![0.0; rows]; 2];
+    Rollout::new(&Chain::all(&robot.mechanism)[0], Scheme::default(), &[])
+        .run_with_efforts(&values, &asked, |seen| {
+            if let Simulated::Effort(seen) = seen {
+                efforts[seen.joint][seen.row] = seen.effort;
+            }
+        })
+        .unwrap();
+    let mut state = 7_u64;
+    let mut noise = || {
+        let mut one = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / 2f64.powi(53) - 0.5
+        };
+        (0..12).map(|_| one()).sum::<f64>()
+    };
+    let mut out = String::new();
+    for (k, line) in plain.lines().enumerate() {
+        if k == 0 {
+            writeln!(out, "{line},tau_lift,tau_elbow,i_lift,i_elbow").unwrap();
+            continue;
+        }
+        let [a, b] = [0, 1].map(|j| efforts[j][k - 1]);
+        let mut noisy = |x: f64, size: f64| x + size * noise();
+        let read = [noisy(a, 0.05), noisy(b, 0.05), noisy(a / 2.0, 0.02), noisy(b / 3.0, 0.02)];
+        writeln!(out, "{line},{},{},{},{}", read[0], read[1], read[2], read[3]).unwrap();
+    }
+    out
+}
+
 /// A folder with the arm, two logs and a configuration.
 pub(crate) fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -82,6 +126,7 @@ pub(crate) fn folder() -> TempDir {
     write("arm.urdf", ARM);
     write("a.csv", &log(0.3, 1600));
     write("b.csv", &log(2.1, 1200));
+    write("tau.csv", &log_with_efforts(0.3, 1600));
     folder
 }
 
@@ -258,6 +303,77 @@ fn efforts_that_are_fed_forward_are_efforts() {
     // A constant effort is an offset that the log takes back.
     let offset = found.found.values.joints[0].get(Term::Offset);
     assert!((offset - 40.2).abs() < 0.1, "{offset}");
+}
+
+#[test]
+fn measured_efforts_and_currents_are_met_beside_positions() {
+    let folder = folder();
+    let head = "robot = \"arm.urdf\"\nlock = { finger = 0.0 }\n";
+    let run = |text: &str| {
+        let config = config(&folder, text);
+        identify_servo(&config, &mut |_| {}).map(|found| (found.file(&config, &[]), found, config))
+    };
+    // Found by their names; nothing is known of the drives, and velocity gain and friction are told apart.
+    let (file, found, _) =
+        run(&format!("{head}[[log]]\npath = \"tau.csv\"\n[servo]\nlaw = [\"offset\"]\n")).unwrap();
+    assert_eq!(file.fit.efforts.len(), 2, "{:?}", file.fit.efforts);
+    for effort in &file.fit.efforts {
+        assert_eq!((effort.channel.as_str(), effort.unit.as_str()), ("effort", "N m"));
+        assert_eq!(effort.verdict, ServoEffortVerdict::Taken);
+        assert!((effort.rms.unwrap() / 0.05 - 1.0).abs() < 0.1, "{effort:?}");
+    }
+    let value = |file: &ServoFile, term: &str, joint: &str| {
+        let is =
+            |p: &&dynid::servo::ServoParameterRecord| p.term == term && p.joints.iter().any(|j| j == joint);
+        file.parameters.iter().find(is).unwrap_or_else(|| panic!("{term} of {joint}")).value
+    };
+    for joint in ["lift", "elbow"] {
+        assert!((value(&file, "velocity_gain", joint) - 1.0).abs() < 0.03);
+    }
+    let report = found.report(&file).unwrap();
+    assert!(report.contains("Effort in tau.csv"));
+    assert!(report.contains("Measured efforts beside simulated ones"));
+    // Currents on request, with constants that are found.
+    let (file, found, _) = run(&format!(
+        "{head}current = \"i_{{joint}}\"\n[[log]]\npath = \"tau.csv\"\n\
+         [servo]\nlaw = [\"offset\"]\nfit = [\"current\"]\ngains = \"own\"\n"
+    ))
+    .unwrap();
+    assert!(file.fit.efforts.iter().all(|e| e.channel == "current" && e.unit == "A"));
+    for (joint, constant) in [("lift", 2.0), ("elbow", 3.0)] {
+        assert!((value(&file, "torque_constant", joint) / constant - 1.0).abs() < 0.02);
+    }
+    let actuators = found.files().unwrap().files.into_iter().find(|(name, _)| name == "actuators.json");
+    assert!(actuators.unwrap().1.contains("torque_constant"));
+    // Logs need not measure the same, but one must have what is stated.
+    let stated = "[columns]\neffort = \"tau_{joint}\"\n[[log]]\npath = \"a.csv\"\n";
+    let more = "[[log]]\npath = \"tau.csv\"\n[servo]\nlaw = [\"offset\"]\n";
+    let (file, ..) = run(&format!("{head}{stated}{more}")).unwrap();
+    assert_eq!(file.fit.efforts.len(), 2);
+    assert!(
+        file.warnings.iter().any(|w| w.contains("no columns of efforts in a.csv")),
+        "{:?}",
+        file.warnings
+    );
+    let error = run(&format!("{head}{stated}")).unwrap_err();
+    assert!(error.to_string().contains("tau_lift"), "{error}");
+    // What is said of efforts without any is refused.
+    for (key, line) in [("effort_at", "effort_at = \"link\""), ("torque_constant", "torque_constant = 2.0")] {
+        let error = run(&format!("{head}[[log]]\npath = \"a.csv\"\n[servo]\n{line}\n")).unwrap_err();
+        assert!(error.to_string().contains(key), "{error}");
+    }
+    let error =
+        run(&format!("{head}[[log]]\npath = \"a.csv\"\n[servo]\nfit = [\"velocity\"]\n")).unwrap_err();
+    assert!(error.to_string().contains("velocities"), "{error}");
+    // Efforts of another size are told.
+    let text = format!(
+        "{head}[columns]\neffort = {{ columns = \"tau_{{joint}}\", scale = 3.0 }}\n\
+         [[log]]\npath = \"tau.csv\"\n[servo]\nlaw = [\"offset\"]\n"
+    );
+    let (file, ..) = run(&text).unwrap();
+    assert!(file.fit.efforts.iter().all(|e| e.verdict == ServoEffortVerdict::OtherSize));
+    assert!(file.warnings.iter().any(|w| w.contains("not the size")), "{:?}", file.warnings);
+    assert_eq!(file.status.word(), "warn");
 }
 
 #[test]

@@ -63,6 +63,21 @@ pub(super) fn refuse(config: &DesignConfig) -> Result<(), Error> {
             "no value: what wrong gains do is found on logs",
         ),
         (
+            "servo.fit",
+            config.servo.as_ref().is_some_and(|s| s.fit != DriveConfig::default().fit),
+            "no value: a design counts on positions alone",
+        ),
+        (
+            "servo.effort_at",
+            config.servo.as_ref().is_some_and(|s| s.effort_at != DriveConfig::default().effort_at),
+            "no value: a design counts on positions alone",
+        ),
+        (
+            "servo.torque_constant",
+            config.servo.as_ref().is_some_and(|s| !s.torque_constant.is_none()),
+            "no value: a design counts on positions alone",
+        ),
+        (
             "servo.blocks",
             config.servo.as_ref().is_some_and(|s| s.blocks != DriveConfig::default().blocks),
             "no value: a design has no blocks of logs",

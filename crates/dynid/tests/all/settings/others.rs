@@ -457,6 +457,17 @@ half_space = { normal = [1, 0, 0], offset = 0.1 }",
         told("servo.load", "load = \"bodies\""),
         told("servo.step_s", "step_s = 0.001"),
         table("servo.blocks", "[servo]\nposition_gain = 4000.0\nblocks = 30", Refused("servo.blocks")),
+        table("servo.fit", "[servo]\nposition_gain = 4000.0\nfit = []", Refused("servo.fit")),
+        table(
+            "servo.effort_at",
+            "[servo]\nposition_gain = 4000.0\neffort_at = \"link\"",
+            Refused("servo.effort_at"),
+        ),
+        table(
+            "servo.torque_constant",
+            "[servo]\nposition_gain = 4000.0\ntorque_constant = 2.0",
+            Refused("servo.torque_constant"),
+        ),
         table("search.starts", "[search]\nstarts = 2", Changes),
         table("search.seed", "[search]\nseed = 3", Changes),
         beside(
@@ -658,6 +669,16 @@ fn every_key_of_drives_takes_effect_or_is_refused() {
         after: Text { tables, ..Text::default() },
         expect: Changes,
     };
+    // On a log that measures efforts and currents.
+    let efforts = |key, top, before: &'static str, after: &'static str| {
+        let text = |more: &str| Text {
+            top,
+            log: "path = \"tau.csv\"",
+            tables: Box::leak(format!("[servo]\n{more}\n").into_boxed_str()),
+            ..Text::default()
+        };
+        Case { key, before: text(before), after: text(after), expect: Changes }
+    };
     let cases = vec![
         of("robot", "robot = \"none.urdf\"", "", "", Refused("none.urdf")),
         of("lock", "lock = { finger = 0.5 }", "", "", Changes),
@@ -704,6 +725,15 @@ fn every_key_of_drives_takes_effect_or_is_refused() {
             "servo.load",
             "[servo]\nlaw = [\"load_friction\"]",
             "[servo]\nlaw = [\"load_friction\"]\nload = \"bodies\"",
+        ),
+        of("current", "current = \"none_{joint}\"", "", "", Refused("none_lift")),
+        efforts("servo.fit", "", "", "fit = []"),
+        efforts("servo.effort_at", "", "", "effort_at = \"link\""),
+        efforts(
+            "servo.torque_constant",
+            "current = \"i_{joint}\"",
+            "fit = [\"current\"]",
+            "fit = [\"current\"]\ntorque_constant = 2.5",
         ),
         servo("servo.step_s", "[servo]\nstep_s = 0.002", Changes),
         servo("servo.blocks", "[servo]\nblocks = 8", Changes),
