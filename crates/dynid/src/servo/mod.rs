@@ -276,6 +276,10 @@ fn refuse_without(logs: &mut [logs::ReadLog]) -> Result<Vec<String>, Error> {
 fn refuse_idle(config: &ServoConfig, logs: &[ServoLog]) -> Result<(), Error> {
     let has = |channel| logs.iter().any(|log| (0..log.joints()).any(|j| log.measured(channel, j).is_some()));
     let (effort, current) = (has(Channel::Effort), has(Channel::Current));
+    if config.servo.fit.contains(&config::ChannelName::Velocity) && !has(Channel::Velocity) {
+        let file = logs.iter().map(|log| log.name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(ServoFault::NoVelocity { file }.into());
+    }
     let idle = [
         (
             "servo.torque_constant",
