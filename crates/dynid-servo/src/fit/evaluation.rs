@@ -273,15 +273,24 @@ fn part(
     Ok(Part { columns: rollout.columns().to_vec(), sums, count })
 }
 
-/// Simulated readings of all logs, reading by reading, log by log; empty where no log measures it.
+/// Simulated readings of all logs that measure them, reading by reading, log by log; `NaN` in rows between gaps of the clock, which no rollout reaches.
 pub(crate) fn readings(problem: &ServoProblem<'_>, values: &ServoValues) -> Result<Vec<Vec<f64>>, Lost> {
     let n = values.joints.len();
     let mut out = vec![Vec::new(); n * problem.channels.len()];
     for log in problem.logs {
+        let slots = problem.channels.iter().flat_map(|c| (0..n).map(move |j| (*c, j)));
+        let mut begin = Vec::with_capacity(out.len());
+        for (to, (channel, j)) in out.iter_mut().zip(slots) {
+            begin.push(to.len());
+            let rows = log.measured(channel, j).map_or(0, <[f64]>::len);
+            to.resize(to.len() + rows, f64::NAN);
+        }
         for chain in problem.chains {
             let rollout = Rollout::new(chain, problem.scheme, &[]);
-            let mut keep =
-                |seen: Reading<'_>| out[seen.at.0 * n + chain.joints[seen.at.1]].push(seen.simulated);
+            let mut keep = |seen: Reading<'_>| {
+                let slot = seen.at.0 * n + chain.joints[seen.at.1];
+                out[slot][begin[slot] + seen.row] = seen.simulated;
+            };
             see_readings(problem.channels, values, log, (chain, &rollout), &mut keep)?;
         }
     }

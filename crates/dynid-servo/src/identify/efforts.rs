@@ -165,7 +165,7 @@ pub(super) fn take(
             // What the positions tell is the sum of both.
             let in_newtons = if newtons { 1.0 } else { 1.0 / r.scale };
             let whole = joint.get(Term::Viscous) + joint.get(Term::VelocityGain);
-            let damping = (-r.damping * in_newtons).clamp(0.0, whole);
+            let damping = (-r.damping * in_newtons).max(0.0).min(whole);
             joint.set(Term::VelocityGain, damping);
             joint.set(Term::Viscous, whole - damping);
         }

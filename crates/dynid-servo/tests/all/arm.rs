@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3,
 };
+use dynid_servo::identify::ServoIdentification;
 use dynid_servo::{
     Chain, Channel, EffortAt, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Simulated, Term,
 };
@@ -166,4 +167,16 @@ pub(crate) fn log_with_efforts(
         log.effort = efforts;
     }
     log
+}
+
+/// Intervals that hold the truth, of all, by term.
+pub(crate) fn held(found: &ServoIdentification, truth: &[ServoJoint], count: &mut Vec<(Term, usize, usize)>) {
+    for p in &found.parameters {
+        let (Some(half), Some(term)) = (p.half_width, p.free.as_term()) else { continue };
+        let inside = usize::from((p.value - truth[p.free.joints()[0]].get(term)).abs() <= half);
+        match count.iter_mut().find(|(t, ..)| *t == term) {
+            Some((_, hits, of)) => (*hits, *of) = (*hits + inside, *of + 1),
+            None => count.push((term, inside, 1)),
+        }
+    }
 }

@@ -8,7 +8,7 @@ use dynid_servo::{
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::arm::{PERIOD, arm, drives, log, log_with_efforts};
+use crate::arm::{PERIOD, arm, drives, held, log, log_with_efforts};
 
 fn scheme() -> Scheme {
     Scheme { step_s: PERIOD * (1.0 + 1e-6), load: LoadOf::Bodies, ..Scheme::default() }
@@ -34,18 +34,6 @@ fn truth(seed: u64) -> Vec<ServoJoint> {
         joint.set(Term::EffortDelay, 0.7 * PERIOD);
     }
     truth
-}
-
-/// Intervals that hold the truth, of all, by term.
-fn held(found: &ServoIdentification, truth: &[ServoJoint], count: &mut Vec<(Term, usize, usize)>) {
-    for p in &found.parameters {
-        let (Some(half), Some(term)) = (p.half_width, p.free.as_term()) else { continue };
-        let inside = usize::from((p.value - truth[p.free.joints()[0]].get(term)).abs() <= half);
-        match count.iter_mut().find(|(t, ..)| *t == term) {
-            Some((_, hits, of)) => (*hits, *of) = (*hits + inside, *of + 1),
-            None => count.push((term, inside, 1)),
-        }
-    }
 }
 
 /// Machines of the statistical tests: few by default, `DYNID_MACHINES` of them where they are to be counted.

@@ -1,11 +1,11 @@
 //! Simulated arms whose numbers are known.
 
-use dynid_servo::identify::{GroupKind, ServoIdentification, ServoVerdict, identify};
+use dynid_servo::identify::{GroupKind, ServoVerdict, identify};
 use dynid_servo::{Addition, Choice, LoadOf, Scheme, ServoJoint, ServoSettings, Shared, Term};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::arm::{PERIOD, arm, drives, log};
+use crate::arm::{PERIOD, arm, drives, held, log};
 
 /// What is known of the arm's drives: their velocity gains.
 fn settings(joints: &[ServoJoint], law: &[Addition]) -> ServoSettings {
@@ -23,18 +23,6 @@ fn settings(joints: &[ServoJoint], law: &[Addition]) -> ServoSettings {
 
 fn scheme(step_s: f64) -> Scheme {
     Scheme { step_s: step_s * (1.0 + 1e-6), load: LoadOf::Bodies, ..Scheme::default() }
-}
-
-/// Share of intervals that hold the truth, by term, of those that have one.
-fn held(found: &ServoIdentification, truth: &[ServoJoint], count: &mut Vec<(Term, usize, usize)>) {
-    for p in &found.parameters {
-        let (Some(half), Some(term)) = (p.half_width, p.free.as_term()) else { continue };
-        let inside = usize::from((p.value - truth[p.free.joints()[0]].get(term)).abs() <= half);
-        match count.iter_mut().find(|(t, ..)| *t == term) {
-            Some((_, hits, of)) => (*hits, *of) = (*hits + inside, *of + 1),
-            None => count.push((term, inside, 1)),
-        }
-    }
 }
 
 /// Machines of the statistical tests: few by default, `DYNID_MACHINES` of them where they are to be counted.
@@ -220,4 +208,24 @@ fn spikes_of_readings_and_efforts_change_nothing() {
         let half = a.half_width.unwrap_or(f64::INFINITY);
         assert!((a.value - b.value).abs() < half, "{a:?} {b:?}");
     }
+}
+
+#[test]
+fn single_rows_between_gaps_of_the_clock_are_passed_over() {
+    let mechanism = arm(1.0);
+    let truth = drives(&mut ChaCha8Rng::seed_from_u64(9));
+    let mut log = crate::arm::log_with_efforts(
+        &mechanism,
+        &truth,
+        scheme(PERIOD),
+        (2000, 9),
+        (dynid_servo::Channel::Effort, dynid_servo::EffortAt::Drive, 0.05),
+    );
+    // Two gaps with one row between them.
+    log.time[1000..].iter_mut().for_each(|t| *t += 0.5);
+    log.time[1001..].iter_mut().for_each(|t| *t += 0.5);
+    log.breaks = vec![1000, 1001];
+    let found = identify(&mechanism, &[log], &settings(&truth, &[Addition::Zero])).unwrap();
+    assert!(found.rms.iter().all(|x| x.is_finite()) && found.efforts.iter().all(|e| e.rms.is_finite()));
+    assert!(found.step_share.is_finite());
 }
