@@ -11,8 +11,8 @@ use std::error::Error;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use dynid_io::{robot, urdf};
 use dynid_model::{Dynamics, EffortModel, Mechanism, RandomMotion, RegressorBlock, RobotModel, State};
+use dynid_robots::{robot, urdf};
 
 const SAMPLES: usize = 64;
 

@@ -7,8 +7,8 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use dynid_io::LogOptions;
-use dynid_io::log::{Missing, Wanted, open};
+use dynid_logs::LogOptions;
+use dynid_logs::log::{Missing, Wanted, open};
 
 /// Rows of a block.
 const ROWS: usize = 1 << 14;

@@ -2,13 +2,12 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use dynid_io::RobotFile;
-use dynid_model::{Description, Inertia, RobotModel};
-
 use dynid_identify::Error;
 use dynid_identify::estimate::{Estimate, Split};
 use dynid_identify::known_friction::KnownFriction;
 use dynid_identify::pipeline::Identification;
+use dynid_model::{Description, Inertia, RobotModel};
+use dynid_robots::RobotFile;
 
 /// A robot with identified parameters, whatever they come from.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +86,7 @@ impl Source {
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        Self::of(dynid_io::robot::read(path)?, path, text_of)
+        Self::of(dynid_robots::robot::read(path)?, path, text_of)
     }
 
     /// A robot file from its text; `path` stands in messages, and places files that the text refers to.
@@ -96,7 +95,7 @@ impl Source {
     /// As [`Source::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let own = |name: &Path| if name == path { Ok(text.to_owned()) } else { text_of(name) };
-        Self::of(dynid_io::robot::parse(text, path)?, path, own)
+        Self::of(dynid_robots::robot::parse(text, path)?, path, own)
     }
 
     fn of(
@@ -146,7 +145,7 @@ impl Source {
 }
 
 fn text_of(path: &Path) -> Result<String, Error> {
-    dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.into(), source })
+    dynid_files::input::read_text(path).map_err(|source| Error::Read { file: path.into(), source })
 }
 
 impl<'a> Identified<'a> {

@@ -1,7 +1,7 @@
 //! Which identified element has a place in which format.
 
-use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, Owner, RobotModel};
+use dynid_robots::mjcf::JointParameters;
 
 use super::Identified;
 use super::projection::FrictionProjection;

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use dynid_io::mjcf::JointParameters;
+use dynid_identify::Error;
+use dynid_identify::agreement::Agreement;
+use dynid_identify::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
+use dynid_identify::pipeline::Identification;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_robots::mjcf::JointParameters;
 use dynid_rows::conditioning::{PreparedLog, predict};
 use rayon::prelude::*;
 
 use super::joints::{self, Format};
 use super::{CheckStates, FrictionProjection, Identified, projection, read_back};
-use dynid_identify::Error;
-use dynid_identify::agreement::Agreement;
-use dynid_identify::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
-use dynid_identify::pipeline::Identification;
 
 /// What robot files of an identification state and lose, on its training and validation logs.
 ///

@@ -37,12 +37,11 @@ mod judged;
 mod projection;
 mod read_back;
 
-use dynid_io::mjcf::{self, JointParameters};
-use dynid_io::urdf::{self, JointDynamics};
+use dynid_identify::Error;
 use dynid_model::mechanism::ROOT_JOINT;
 use dynid_model::{Description, EffortModel, Inertia, JointKind};
-
-use dynid_identify::Error;
+use dynid_robots::mjcf::{self, JointParameters};
+use dynid_robots::urdf::{self, JointDynamics};
 
 /// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
 pub const READ_BACK_LIMIT: f64 = 1e-9;
@@ -264,8 +263,8 @@ impl<'a> RobotExport<'a> {
         if self.source.is_mjcf() { self.mjcf(states) } else { self.urdf(states) }
     }
 
-    /// MJCF: that of the robot is edited in place (see [`dynid_io::mjcf::edit`]); other robots are written anew, see
-    /// [`dynid_io::mjcf::from_description`], and [`dynid_io::mjcf::from_closed`] for mechanisms with loops.
+    /// MJCF: that of the robot is edited in place (see [`dynid_robots::mjcf::edit`]); other robots are written anew, see
+    /// [`dynid_robots::mjcf::from_description`], and [`dynid_robots::mjcf::from_closed`] for mechanisms with loops.
     ///
     /// # Errors
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
@@ -334,7 +333,7 @@ impl<'a> RobotExport<'a> {
         let closed = self.identified.model.closed()?;
         let machine = closed.machine();
         let (driven, home) = (machine.driven_names(), machine.home_by_joint());
-        let loops = dynid_io::toml_robot::Loops {
+        let loops = dynid_robots::toml_robot::Loops {
             name: &self.description.name,
             urdf,
             gravity: self.description.gravity,

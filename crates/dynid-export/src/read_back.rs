@@ -1,6 +1,6 @@
 //! Whether a written robot gives the identified effort.
 
-use dynid_io::mjcf::JointParameters;
+use dynid_identify::Error;
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
 use dynid_model::{
@@ -8,11 +8,11 @@ use dynid_model::{
     TreeModel,
 };
 use dynid_motion::Channel;
+use dynid_robots::mjcf::JointParameters;
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 
 use super::READ_BACK_LIMIT;
 use super::error::ExportError;
-use dynid_identify::Error;
 
 /// Random states of a check without logs.
 const STATES: usize = 1000;

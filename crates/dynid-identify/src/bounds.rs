@@ -1,7 +1,7 @@
 //! Bounds of a run as rows of the consistent estimate.
 
 use dynid_estimate::consistent::Bound;
-use dynid_io::closest;
+use dynid_files::closest;
 use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;

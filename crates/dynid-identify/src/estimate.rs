@@ -510,7 +510,7 @@ impl Estimate {
     /// [`Error::Read`], [`Error::EstimateFile`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text =
-            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+            dynid_files::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         Estimate::parse(&text, &path.display().to_string())
     }
 

@@ -17,65 +17,46 @@
 
 pub mod agreement;
 pub mod bounds;
-pub mod caution;
-mod check;
 pub mod closed_loop;
-pub mod commands;
 pub mod consistency;
 pub mod cyclic_doubt;
 pub mod effort_scale;
-pub mod elements;
-mod error;
 pub mod estimate;
-mod finding;
 pub mod fitting;
 mod friction_power;
 mod identification;
-mod input_record;
-
 mod joint_cyclic;
 mod joint_stiffness;
 mod journal_doubt;
 pub mod knowledge;
-pub mod known_friction;
 mod linear_method;
 mod load_doubt;
 mod load_rounds;
-pub mod log;
 pub mod log_agreement;
-mod log_axis;
-pub mod log_terms;
 pub mod overlap;
 mod own_delay;
 pub mod passivity;
-mod per_joint;
 pub mod pipeline;
 pub mod preflight;
 mod problem;
 pub mod reduction;
-mod reduction_error;
 mod result;
-pub mod robot;
 pub mod searches;
-pub mod settings;
 pub mod shape;
 pub mod stiffness;
 mod structure;
 pub mod tie_test;
 mod trained_log;
-mod training_log;
 pub mod trust;
 pub mod verdict;
 
 pub use dynid_estimate::{advice, prior};
-pub use error::{Error, Fault};
+pub use dynid_setup::{
+    Error, Fault, Log, Robot, RobotOptions, Settings, VERSION, caution, commands, elements, known_friction,
+    log, log_terms, robot, settings,
+};
+use dynid_setup::{check, finding, input_record, reduction_error, training_log};
 pub use estimate::Estimate;
 pub use identification::Identification;
 pub use joint_cyclic::JointCyclic;
-pub use log::Log;
 pub use pipeline::{Step, identify};
-pub use robot::{Robot, RobotOptions};
-pub use settings::Settings;
-
-/// Version of the program.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");

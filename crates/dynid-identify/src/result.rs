@@ -102,7 +102,7 @@ impl Identification {
 
     /// Robot, logs and friction as they were read, with what their bytes hash to; what came as arrays is not among them.
     pub fn inputs(&self) -> Vec<InputRecord> {
-        let mut out = InputRecord::of_robot(&self.robot);
+        let mut out = self.robot.inputs();
         for (k, source) in self.sources.iter().enumerate() {
             let validates = k >= self.trained.len();
             out.extend(source.inputs.iter().map(|input| match input.kind {

@@ -1,6 +1,6 @@
 //! Design of excitation trajectories for the condition number of a model's base columns.
 
-use dynid::fault::DesignError;
+use dynid::design::DesignError;
 use std::f64::consts::PI;
 use std::sync::Arc;
 

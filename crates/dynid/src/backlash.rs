@@ -5,7 +5,7 @@ use std::path::Path;
 use dynid_clearance::backlash::{
     BacklashSettings, BacklashSignals, BacklashVerdict as Found, estimate as look_for,
 };
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_motion::filter::{anti_alias, pick};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_clearance::swing::{self, SwingSettings};
-use dynid_io::{ClearanceSpec, MappingSpec};
+use dynid_logs::MappingSpec;
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel, journal_channels};
 use dynid_motion::Channel;
+use dynid_robots::ClearanceSpec;
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States, prepare};
 use serde::Serialize;
 

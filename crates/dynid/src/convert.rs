@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use dynid_io::table_file::{self, Column, JointStates, TableFormat};
-use dynid_io::{MappingSpec, OutputError, ReadingNote, Signals};
+use dynid_files::OutputError;
+use dynid_logs::table_file::{self, Column, JointStates, TableFormat};
+use dynid_logs::{MappingSpec, ReadingNote, Signals};
 
 use crate::Error;
 use crate::config::LogConfig;

@@ -1,6 +1,6 @@
 //! Identified parameters back into a robot file: [`dynid_export`], and states of log files to compare efforts at.
 
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 use dynid_model::RobotModel;
 use dynid_rows::conditioning::ConditioningSettings;
 

@@ -107,7 +107,7 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
         warnings.push("shape parameters of friction are held where they start".to_owned());
     }
     let name = model.mechanism().name().to_owned();
-    let mut inputs = InputRecord::of_robot(&robot);
+    let mut inputs = robot.inputs();
     inputs.extend(loaded.iter().flat_map(|log| log.source.inputs.iter().cloned()));
     inputs.extend(plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)));
     Ok(GainIdentification {

@@ -7,35 +7,23 @@ pub mod backlash;
 pub mod check;
 pub mod clearance;
 pub mod compare;
-pub mod config;
 pub mod convert;
-pub mod design;
 pub mod diff;
 pub mod explain;
 pub mod export;
-pub mod fault;
 pub mod fleet;
 pub mod friction;
-pub mod friction_model;
 pub mod gains;
 mod identify;
 pub mod init;
 pub mod inspect;
-mod joint_limits;
-pub mod logs;
-pub mod motions;
-pub mod nominal;
 pub mod online;
 pub mod payload;
 pub mod predict;
-mod provenance;
 pub mod reduce;
 mod report_data;
 mod run;
 pub mod schema;
-mod sealed;
-pub mod servo;
-pub mod simulate;
 pub mod validate;
 
 pub use dynid_identify::{Error, Estimate, Fault, Identification, Robot, RobotOptions, Step, VERSION};
@@ -45,20 +33,29 @@ pub use dynid_identify::{
     robot, searches, settings, shape, stiffness, trust, verdict,
 };
 
-pub use config::Config;
-pub use friction::{FrictionConfig, FrictionModel, identify_friction};
+pub use dynid_config::{Config, FrictionModel, config, fault, friction_model, logs, nominal};
+pub use dynid_drives as servo;
+pub use dynid_experiments::{design, motions, simulate};
+
+pub use friction::{FrictionConfig, identify_friction};
 pub use identify::identify;
 pub use report_data::report as report_page;
 pub use run::Run;
 
 pub use dynid_excitation as excitation;
-pub use dynid_io as io;
 pub use dynid_model as model;
 pub use dynid_motion as motion;
 pub use dynid_record as record;
 pub use dynid_report as report;
 pub use dynid_servo as servo_fits;
 pub use dynid_sim as sim;
+
+/// Files in and out: robots, logs, trajectories.
+pub mod io {
+    pub use dynid_files::*;
+    pub use dynid_logs::*;
+    pub use dynid_robots::*;
+}
 
 /// Everything between rows and estimates, whichever room it is in.
 pub mod estimators {

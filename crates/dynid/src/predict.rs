@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_io::{LogHeader, MappingSpec, ReadOptions, States, StatesError, Table, states};
+use dynid_logs::{LogHeader, MappingSpec, ReadOptions, States, StatesError, Table, states};
 use dynid_model::element::temperature_channel;
 use dynid_model::{BaseParameters, EffortModel, JournalModel, MotionBlock, RegressorBlock, RobotModel};
 
@@ -11,7 +11,7 @@ use crate::estimate::ReadingRecord;
 use crate::logs;
 use crate::robot::model_state_joints;
 
-/// Reads states of a model: columns named as in a table of states ([`dynid_io::states::read`]), else those by which the training
+/// Reads states of a model: columns named as in a table of states ([`dynid_logs::states::read`]), else those by which the training
 /// logs were read, with their units.
 ///
 /// # Errors
@@ -22,7 +22,7 @@ pub fn read_states(
     model: &RobotModel,
     reading: Option<&ReadingRecord>,
 ) -> Result<States, Error> {
-    let table = dynid_io::csv::read(path, options).map_err(StatesError::File)?;
+    let table = dynid_logs::csv::read(path, options).map_err(StatesError::File)?;
     let joints = model_state_joints(model);
     let named = states::from_table_with_channels(&table, &joints, &wanted_channels(model, &table));
     let recorded = reading.filter(|r| r.columns.position.is_some() && r.motor_side.is_none());

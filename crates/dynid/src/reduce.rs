@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 
 pub use dynid_identify::reduction::{
     Column, FactorFileFault, LogFacts, Recipe, ReducedLog, Reducer, Reduction, ReductionError, VERSION,
@@ -96,7 +96,7 @@ pub fn reduce_log(
 /// # Errors
 /// [`Error::Read`], [`Error::Reduction`].
 pub fn read(path: &Path) -> Result<Reduction, Error> {
-    let bytes = dynid_io::input::read(path).map_err(|source| Error::Read { file: path.into(), source })?;
+    let bytes = dynid_files::input::read(path).map_err(|source| Error::Read { file: path.into(), source })?;
     Ok(Reduction::from_bytes(&bytes, &path.display().to_string())?)
 }
 
@@ -112,7 +112,7 @@ pub fn read_all<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<Reducti
 /// Whether a file begins as factor files do.
 pub fn is_factor_file(path: &Path) -> bool {
     let mut head = [0; 14];
-    let opened = dynid_io::input::open(path);
+    let opened = dynid_files::input::open(path);
     opened.is_ok_and(|mut file| std::io::Read::read_exact(&mut file, &mut head).is_ok())
         && head == *b"dynid factors "
 }

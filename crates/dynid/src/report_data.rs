@@ -3,14 +3,13 @@
 mod files;
 mod first;
 mod friction;
-mod picture;
 mod searches;
-mod settings;
 mod trust;
 
 use std::ops::Deref;
 use std::sync::Arc;
 
+use dynid_config::pages::{picture, plain, settings_table};
 use dynid_estimate::linear::{LinearMethod, OwnEstimator};
 use dynid_report as report;
 use dynid_report::{Fact, Value};
@@ -21,9 +20,6 @@ use crate::config::{Config, Method};
 use crate::estimate::short_name;
 use crate::estimate::{Choice, Estimate, Provenance};
 use crate::pipeline::Identification;
-
-pub(crate) use picture::picture;
-pub(crate) use settings::settings_table;
 
 /// What pictures leave out of a prediction.
 const AT_REST: &str = " Where a joint stands, friction of velocity is left out of the predicted curve: it may have any value up to \
@@ -396,7 +392,7 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
 fn chosen(choice: &Choice) -> report::Chosen {
     report::Chosen {
         name: choice.name.clone(),
-        value: settings::plain(&choice.value),
+        value: plain(&choice.value),
         unit: choice.unit.clone(),
         origin: choice.origin,
         reason: choice.reason.clone(),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::ConditioningSettings;
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
 use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
+use dynid::io::FileMember;
 use dynid::io::MappingSpec;
-use dynid::io::log::LogFile;
 use dynid::logs::sha256;
 use dynid_terminal::message::{Failure, Notes, json as print_json, note};
 use dynid_terminal::outputs::{self, is_stdout, marked_toml, marked_xml};
@@ -246,7 +246,7 @@ fn robot_file(args: &ExportArgs, estimate: &Estimate) -> Result<PathBuf, Failure
         return Err(Failure::Usage(text, HINT));
     };
     let path = PathBuf::from(&record.path);
-    if !LogFile::of(&path).path.is_file() {
+    if !FileMember::of(&path).path.is_file() {
         let text = format!("{}: robot file `{}` is not there", args.estimate.display(), record.path);
         return Err(Failure::Usage(text, HINT));
     }

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use dynid_io::{
-    ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
-    ReactionSpec, RobotFile, SettingValue, TieSpec,
-};
 use dynid_model::element::ElementRegistry;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
     Placement, Vec3,
+};
+use dynid_robots::{
+    ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
+    ReactionSpec, RobotFile, SettingValue, TieSpec,
 };
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,7 @@
 //! How logs were read.
 
-use dynid_io::{MappingSpec, SourceFile};
+use dynid_logs::MappingSpec;
 use serde::{Deserialize, Serialize};
-
-use crate::input_record::{InputKind, InputRecord};
-use crate::robot::Robot;
 
 /// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
 /// `effort_joint = matrixᵀ · effort_motor`.
@@ -35,19 +32,5 @@ impl ReadingRecord {
     /// Whether the run stated columns, and did not leave all of them to their names.
     pub fn states_columns(&self) -> bool {
         self.columns != MappingSpec::default()
-    }
-}
-
-impl InputRecord {
-    /// A file that was read.
-    pub fn of(kind: InputKind, source: &SourceFile) -> Self {
-        let SourceFile { path, sha256 } = source.clone();
-        InputRecord { path, kind, sha256 }
-    }
-
-    /// A robot file, and the URDF that it refers to.
-    pub fn of_robot(robot: &Robot) -> Vec<Self> {
-        let kinds = [InputKind::Robot, InputKind::Urdf];
-        robot.file.sources.iter().zip(kinds).map(|(source, kind)| InputRecord::of(kind, source)).collect()
     }
 }

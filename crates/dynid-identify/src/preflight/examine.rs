@@ -2,7 +2,7 @@
 
 use dynid_estimate::consistent::Problem;
 use dynid_factor::Factor;
-use dynid_io::columns::degrees_suspected;
+use dynid_logs::columns::degrees_suspected;
 use dynid_model::EffortModel;
 use dynid_motion::UniformLog;
 use dynid_rows::preflight::{
@@ -119,7 +119,9 @@ impl Bench {
                 continue;
             }
             let source = &log.joints[wiring.position[j].joint].position;
-            let Some(found) = degrees_suspected(std::slice::from_ref(source), &[limits]) else { continue };
+            let Some(found) = degrees_suspected(std::slice::from_ref(source), &[limits.position]) else {
+                continue;
+            };
             let evidence = format!(
                 "positions reach {:.1}, {:.0} times the limit of {:.3} rad that they keep as degrees",
                 found.largest,

@@ -12,7 +12,7 @@ mod examine;
 mod plausibility;
 mod record;
 
-use dynid_io::ReadingNote;
+use dynid_logs::ReadingNote;
 use dynid_motion::UniformLog;
 use rayon::prelude::*;
 use serde::Serialize;

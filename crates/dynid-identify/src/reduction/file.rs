@@ -45,7 +45,7 @@ pub(super) fn key(recipe: &str, groups: &[ReducedGroup]) -> String {
     let whole: Vec<ReducedGroup> = groups.iter().map(|g| g.coarsened(g.blocks.len().max(1))).collect();
     let mut bytes = recipe.as_bytes().to_vec();
     write_groups(&whole, &mut bytes);
-    dynid_io::digest::sha256(&bytes)
+    dynid_files::digest::sha256(&bytes)
 }
 
 impl Reduction {
@@ -116,7 +116,7 @@ fn written(recipe: Option<&Recipe>, recipe_sha256: &str, reduced: &[ReducedLog])
         let before = factors.len();
         write_groups(&log.groups, &mut factors);
         let bytes = (factors.len() - before) as u64;
-        let sha256 = dynid_io::digest::sha256(&factors[before..]);
+        let sha256 = dynid_files::digest::sha256(&factors[before..]);
         logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes, sha256 });
     }
     let description = Description { recipe: recipe.cloned(), recipe_sha256: recipe_sha256.to_owned(), logs };
@@ -125,7 +125,7 @@ fn written(recipe: Option<&Recipe>, recipe_sha256: &str, reduced: &[ReducedLog])
     out.extend((text.len() as u64).to_le_bytes());
     out.extend(text.as_bytes());
     out.extend(factors);
-    out.extend(dynid_io::digest::sha256_bytes(&out));
+    out.extend(dynid_files::digest::sha256_bytes(&out));
     out
 }
 
@@ -147,7 +147,7 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         return Err(cut(expected));
     }
     let (before, digest) = bytes.split_at(bytes.len() - DIGEST);
-    if dynid_io::digest::sha256_bytes(before) != digest {
+    if dynid_files::digest::sha256_bytes(before) != digest {
         return Err(Fault::Damaged);
     }
     // Both fit: the file holds them.
@@ -179,7 +179,7 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         let named = |fault| Fault::Factors { log: facts.name.clone(), fault };
         let groups = read_groups(own, 0, columns).map_err(named)?;
         let wrong = |what: &str| Err(Fault::Log { log: facts.name.clone(), what: what.to_owned() });
-        if dynid_io::digest::sha256(own) != sha256 {
+        if dynid_files::digest::sha256(own) != sha256 {
             return wrong("its factors are not those that were written");
         }
         if expected.len() != 2 * DIGEST || !expected.bytes().all(|b| b.is_ascii_hexdigit()) {

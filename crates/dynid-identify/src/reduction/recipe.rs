@@ -275,7 +275,9 @@ impl Identification {
             free: self.power.kept.clone(),
             free_errors: self.plan.free_errors,
             settings: Asked::of(&self.settings),
-            inputs: InputRecord::of_robot(&self.robot)
+            inputs: self
+                .robot
+                .inputs()
                 .into_iter()
                 .chain(
                     self.plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)),
@@ -315,7 +317,7 @@ impl Recipe {
             doubts: Vec::new(),
             ..self.clone()
         };
-        dynid_io::digest::sha256(plain(&without_paths).as_bytes())
+        dynid_files::digest::sha256(plain(&without_paths).as_bytes())
     }
 
     /// Per column the standard parameter that stands for it.

@@ -18,8 +18,8 @@ use crate::Error;
 use crate::caution::{self, Caution};
 use crate::finding::{FindingId, Severity};
 use crate::fitting::conditioning_fault;
+use crate::log::Log;
 use crate::log::turns::Unwrapped;
-use crate::log::{Log, LogSource};
 use crate::problem::Problem;
 use crate::settings::LogSettings;
 use crate::trained_log::{TrainedLog, velocities_in};
@@ -59,23 +59,26 @@ impl Reducer {
         I: IntoIterator<Item = Result<Portion, Error>>,
         I::IntoIter: Send,
     {
-        let Log { log, settings, reference, unwrapped, source } = first;
-        let name = log.name().to_owned();
         let mut rest = rest.into_iter();
-        let mut held = Portion::of(log);
         let rows = self.windows.part_rows;
-        let in_windows = self.in_windows(&settings);
-        gather(&mut held, &mut rest, &name, if in_windows { rows + 1 } else { usize::MAX })?;
-        if held.rows() <= rows || !in_windows {
-            let log = held.into_log(name)?;
-            return self.reduce_whole(Log { log, settings, reference, unwrapped, source });
-        }
-        let from = self.part_of(&mut held, &mut rest, &name)?;
-        let part = from..from + rows;
-        let source = LogSource { rows: data_rows(&source.rows, part.clone()), ..source };
-        let log = held.part(part.clone()).into_log(name.clone())?;
-        let part = Examining { part, held, rest };
-        self.reduce_windows(Log { log, settings, reference, unwrapped, source }, part)
+        let in_windows = self.in_windows(&first.settings);
+        let mut examining = None;
+        let mut log = first.map_signals(|signals| {
+            let name = signals.name().to_owned();
+            let mut held = Portion::of(signals);
+            gather(&mut held, &mut rest, &name, if in_windows { rows + 1 } else { usize::MAX })?;
+            if held.rows() <= rows || !in_windows {
+                return Ok::<_, Error>(held.into_log(name)?);
+            }
+            let from = self.part_of(&mut held, &mut rest, &name)?;
+            let part = from..from + rows;
+            let looked_at = held.part(part.clone()).into_log(name)?;
+            examining = Some((part, held));
+            Ok(looked_at)
+        })?;
+        let Some((part, held)) = examining else { return self.reduce_whole(log) };
+        log.source.rows = data_rows(&log.source.rows, part.clone());
+        self.reduce_windows(log, Examining { part, held, rest })
     }
 
     /// Where the part of a log begins that is looked at.

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use dynid_io::columns::ColumnUse;
-use dynid_io::{ColumnMapping, ElasticSpec, ElementSetting, SettingValue};
+use dynid_logs::ColumnMapping;
+use dynid_logs::columns::ColumnUse;
 use dynid_motion::JointSignals;
+use dynid_robots::{ElasticSpec, ElementSetting, SettingValue};
 
 use crate::Error;
-use crate::log::{Log, LogSource, understood};
+use crate::log::{Log, understood};
 use crate::robot::Robot;
 use crate::settings::Settings;
 
@@ -92,7 +93,19 @@ pub(crate) fn stiff_settings(settings: &Settings, robot: &Robot) -> Settings {
 /// [`Error::Log`].
 pub(crate) fn at_motors(log: Log, elastic: &[ElasticSpec]) -> Result<Log, Error> {
     let name = log.log.name().to_owned();
-    let (time, joints, channels) = log.log.into_parts();
+    let mapping = log.source.mapping.as_ref().map(|mapping| mapping_at_motors(mapping, elastic));
+    let columns = mapping.as_ref().map_or_else(|| log.source.columns.clone(), understood);
+    let mut log = log.map_signals(|signals| signals_at_motors(name, signals, elastic))?;
+    (log.source.mapping, log.source.columns) = (mapping, columns);
+    Ok(log)
+}
+
+fn signals_at_motors(
+    name: String,
+    signals: dynid_motion::Log,
+    elastic: &[ElasticSpec],
+) -> Result<dynid_motion::Log, Error> {
+    let (time, joints, channels) = signals.into_parts();
     let of_motor = |joint: &str| elastic.iter().find(|spec| spec.joint == joint);
     let is_motor = |joint: &JointSignals| elastic.iter().any(|spec| spec.motor == joint.name);
     let scaled = |signal: &[f64], factor: f64| signal.iter().map(|x| x * factor).collect::<Vec<f64>>();
@@ -110,13 +123,7 @@ pub(crate) fn at_motors(log: Log, elastic: &[ElasticSpec]) -> Result<Log, Error>
         }
     });
     let kept = kept.collect();
-    let mapping = log.source.mapping.map(|mapping| mapping_at_motors(&mapping, elastic));
-    let columns = mapping.as_ref().map_or_else(|| log.source.columns.clone(), understood);
-    Ok(Log {
-        log: dynid_motion::Log::new(name, time, kept, channels)?,
-        source: LogSource { mapping, columns, ..log.source },
-        ..log
-    })
+    Ok(dynid_motion::Log::new(name, time, kept, channels)?)
 }
 
 /// The columns of a log of an elastic robot as those of the same robot with stiff joints.

@@ -1,8 +1,8 @@
 //! Rows 4 and 5: the printed trajectory and one of our own.
 
+use dynid::design::DesignError;
 use dynid::excitation::constraint::{FramePoint, Region};
 use dynid::excitation::{Outcome, Problem, Settings as SearchSettings, design, information, limit_points};
-use dynid::fault::DesignError;
 use dynid::model::{RobotModel, Vec3};
 use dynid::motion::trajectory::{Form, Fourier, RowOrder};
 use serde_json::json;

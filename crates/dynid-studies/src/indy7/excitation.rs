@@ -1,6 +1,6 @@
 //! Row 7: excitation trajectories.
 
-use dynid::fault::DesignError;
+use dynid::design::DesignError;
 use std::sync::Arc;
 
 use dynid::excitation::constraint::{FramePoint, Region};

@@ -1,6 +1,6 @@
 //! Row B5: trajectories of the platform designed within the limits of sliders and legs.
 
-use dynid::fault::DesignError;
+use dynid::design::DesignError;
 
 use dynid::excitation::{
     Outcome, Problem, Settings as SearchSettings, design, limit_points, random_trajectory,

@@ -1,8 +1,8 @@
 //! Row 10: trajectories of our own, from the printed one.
 
+use dynid::design::DesignError;
 use dynid::excitation::criterion::{Criterion, Measure};
 use dynid::excitation::{Outcome, Settings as SearchSettings, design, limit_points};
-use dynid::fault::DesignError;
 use serde_json::json;
 
 use super::pointing::Pointing;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid_io::columns::{ColumnUse, TimeSource};
-use dynid_io::{ColumnMapping, MappingSpec};
+use dynid_logs::columns::{ColumnUse, TimeSource};
+use dynid_logs::{ColumnMapping, MappingSpec};
 use dynid_rows::preflight::Wiring;
 use toml::{Table, Value};
 
@@ -224,8 +224,8 @@ fn rewire(
 }
 
 fn read(path: &Path) -> Result<Table, Error> {
-    let text =
-        dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+    let text = dynid_files::input::read_text(path)
+        .map_err(|source| Error::Read { file: path.to_owned(), source })?;
     crate::config::toml_file::parse(&text, &path.display().to_string())
 }
 
@@ -234,7 +234,7 @@ fn as_read<'a>(table: &'a Table, key: &str, folder: &Path) -> Vec<(PathBuf, &'a 
     let entries = table.get(key).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_table);
     let paths = |entry: &Table| {
         let path = entry.get("path").and_then(Value::as_str).map(|path| folder.join(path))?;
-        dynid_io::log::files(&path).ok()
+        dynid_logs::log::files(&path).ok()
     };
     let of_entry = |entry| paths(entry).into_iter().flatten().map(move |path| (path, entry));
     entries.flat_map(of_entry).collect()

@@ -67,7 +67,7 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
         logs: Vec::new(),
         traces: Vec::new(),
         mapped: Vec::new(),
-        inputs: InputRecord::of_robot(&robot),
+        inputs: robot.inputs(),
     };
     let mut bench: Option<(Vec<String>, Bench)> = None;
     let training = config.training_logs();

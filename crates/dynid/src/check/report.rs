@@ -109,7 +109,7 @@ impl Check {
             ..StudySection::default()
         }];
         sections.extend(self.logs.iter().zip(&self.traces).map(|(log, trace)| section(log, trace)));
-        let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
+        let inputs = self.inputs.iter().map(dynid_config::provenance::shown).collect();
         crate::fault::page(report::render_log_page(&report::LogPage {
             kind: "Pre-flight".to_owned(),
             title: format!(

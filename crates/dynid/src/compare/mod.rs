@@ -19,7 +19,6 @@ use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
-use crate::estimate::InputRecord;
 use crate::pipeline::{ModelFit, Problem, Step};
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
@@ -75,7 +74,7 @@ pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) ->
             each.collect::<Result<Vec<FoldScore>, Error>>().map_err(|e| e.to_string())
         })
         .collect();
-    let mut inputs = InputRecord::of_robot(&opened.problem.robot);
+    let mut inputs = opened.problem.robot.inputs();
     inputs.extend(opened.inputs().cloned());
     Ok(record::ranked(&opened.problem, inputs, &conditioning, &list, scores))
 }

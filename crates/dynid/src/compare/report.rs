@@ -14,7 +14,7 @@ impl Comparison {
     /// # Errors
     /// [`PageError`](crate::fault::PageError).
     pub fn report(&self) -> Result<String, Error> {
-        let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
+        let inputs = self.inputs.iter().map(dynid_config::provenance::shown).collect();
         let sections = vec![
             StudySection {
                 title: "Errors on unseen time".to_owned(),

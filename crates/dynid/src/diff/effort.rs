@@ -1,6 +1,6 @@
 //! Efforts of two models against each other.
 
-use dynid_io::States;
+use dynid_logs::States;
 use dynid_model::{EffortModel, RegressorBlock};
 use serde::Serialize;
 

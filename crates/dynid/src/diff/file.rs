@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use dynid_io::RobotFile;
-use dynid_io::urdf;
 use dynid_model::EffortModel;
+use dynid_robots::RobotFile;
+use dynid_robots::urdf;
 
 use super::structure;
 use crate::Error;
@@ -23,7 +23,7 @@ pub struct StatedRobot {
 
 impl StatedRobot {
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
-        Ok(StatedRobot { path: path.to_owned(), file: dynid_io::robot::read(path)? })
+        Ok(StatedRobot { path: path.to_owned(), file: dynid_robots::robot::read(path)? })
     }
 
     /// Values by the names of parameters, the robot read as it was for an estimate; the inner `Err` says why it is another robot.
@@ -65,7 +65,7 @@ impl StatedRobot {
     /// Viscous and Coulomb friction that a URDF states.
     fn dynamics(&self) -> Result<Vec<(String, f64)>, Error> {
         let Some(path) = &self.file.urdf else { return Ok(Vec::new()) };
-        let text = dynid_io::input::read_text(path.as_ref())
+        let text = dynid_files::input::read_text(path.as_ref())
             .map_err(|source| Error::Read { file: path.into(), source })?;
         let joints = urdf::dynamics(&text, path)?;
         let values = |j: &urdf::JointDynamics| {

@@ -14,7 +14,7 @@ mod structure;
 
 use std::path::Path;
 
-use dynid_io::{ReadOptions, States};
+use dynid_logs::{ReadOptions, States};
 use dynid_model::{EffortModel, Parameter, RobotModel};
 
 use crate::Error;
@@ -38,10 +38,10 @@ impl Side {
     /// Reads an estimate, or a robot file: what is no JSON.
     ///
     /// # Errors
-    /// As [`Estimate::read`] and [`dynid_io::robot::read`].
+    /// As [`Estimate::read`] and [`dynid_robots::robot::read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text =
-            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+            dynid_files::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
             Some(b'{') => Ok(Side::Estimate(Box::new(Estimate::read(path)?))),
             _ => Ok(Side::Robot(Box::new(StatedRobot::read(path)?))),

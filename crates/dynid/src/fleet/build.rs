@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use dynid_factor::Factor;
+use dynid_files::digest::sha256_bytes;
 use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetError, FleetLog};
 use dynid_identify::reduction::{Origin, ReducedLog};
-use dynid_io::digest::sha256_bytes;
 use dynid_linalg::{AsView, Mat};
 use dynid_model::Owner;
 

@@ -29,7 +29,7 @@ pub struct Entry {
 /// # Errors
 /// [`FleetFault::Manifest`], [`Error::Read`].
 pub fn manifest(path: &Path) -> Result<Vec<Entry>, Error> {
-    let bytes = dynid_io::input::read(path).map_err(|source| Error::Read { file: path.into(), source })?;
+    let bytes = dynid_files::input::read(path).map_err(|source| Error::Read { file: path.into(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     Ok(entries(&bytes, &path.display().to_string(), folder)?)
 }

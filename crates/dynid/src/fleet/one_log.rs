@@ -4,11 +4,11 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use dynid_files::digest::sha256;
 use dynid_identify::log::Log;
 use dynid_identify::reduction::{LogFacts, Origin, ReducedLog, Reducer};
 use dynid_identify::settings::{LogSettings, labels};
-use dynid_io::MappingSpec;
-use dynid_io::digest::sha256;
+use dynid_logs::MappingSpec;
 
 use super::failure::Failure;
 use super::manifest::Entry;
@@ -118,14 +118,14 @@ impl LogReducer {
 
     /// Which log an entry is: by the bytes of its file, its origin, the recipe, how it is read, and the version of the numerics.
     pub(super) fn id(&self, entry: &Entry) -> Result<String, Box<Failure>> {
-        let file = dynid_io::log::LogFile::of(&entry.path);
+        let file = dynid_files::FileMember::of(&entry.path);
         let unreadable = |source| {
             let error = Error::Read { file: entry.log.clone().into(), source };
             Box::new(Failure::of(&entry.log, &entry.origin.robot, &error))
         };
         let hash = match file.path.is_dir() {
             true => folder_digest(&file.path),
-            false => dynid_io::digest::sha256_of_file(&file.path),
+            false => dynid_files::digest::sha256_of_file(&file.path),
         };
         let hash = hash.map_err(unreadable)?;
         let source = match file.member {

@@ -1,12 +1,12 @@
 //! The pages: one of the fleet, one of every robot that asks for one.
 
+use dynid_config::pages::settings_table;
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
 
 use super::FleetResult;
 use super::record::{FleetFile, RobotRecord, RobotState};
 use crate::Error;
-use crate::report_data::settings_table;
 
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;

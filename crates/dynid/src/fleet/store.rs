@@ -12,9 +12,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use dynid_files::digest::sha256;
+use dynid_files::output::write_atomically;
 use dynid_identify::reduction::{ReducedLog, Reduction};
-use dynid_io::digest::sha256;
-use dynid_io::output::write_atomically;
 use rayon::prelude::*;
 
 use super::FleetFault;
@@ -216,6 +216,6 @@ impl FactorStore {
 
 fn make_folder(folder: &Path) -> Result<(), Error> {
     fs::create_dir_all(folder).map_err(|error| {
-        Error::Output(dynid_io::OutputError::Unwritable { file: folder.display().to_string(), error })
+        Error::Output(dynid_files::OutputError::Unwritable { file: folder.display().to_string(), error })
     })
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use dynid_friction::steady_friction::{LawForm, SteadySettings, ViscousForm};
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 use dynid_motion::constant_speed::{PairSettings, SegmentSettings};
 use serde::{Deserialize, Serialize};
 
@@ -274,7 +274,7 @@ impl FrictionConfig {
         config.out = config.out.map(|o| folder.join(o));
         let mut logs = Vec::new();
         for log in &config.log {
-            for path in dynid_io::log::files(&folder.join(&log.path))? {
+            for path in dynid_logs::log::files(&folder.join(&log.path))? {
                 logs.push(FrictionLog { path, ..log.clone() });
             }
         }

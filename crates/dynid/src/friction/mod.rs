@@ -81,7 +81,7 @@ pub fn identify_friction(
     refuse_elastic(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
-    let mut inputs = InputRecord::of_robot(&robot);
+    let mut inputs = robot.inputs();
     let known = experiment::driven(&robot);
     if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
         return Err(Error::UnknownJoint { name: name.clone(), known });

@@ -1,5 +1,6 @@
 //! The report page of friction experiments.
 
+use dynid_config::pages::settings_table;
 use dynid_friction::steady_friction::{SteadyFriction, ThermalLine};
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
@@ -8,7 +9,6 @@ use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
 use crate::friction_model::{FrictionModel, FrictionStatus, JointFrictionModel};
 use crate::known_friction::ViscousModel;
-use crate::report_data::settings_table;
 
 /// Points along a drawn curve.
 const CURVE: usize = 120;

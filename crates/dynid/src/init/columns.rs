@@ -1,7 +1,7 @@
 //! Columns as a configuration states them.
 
-use dynid_io::ColumnMapping;
-use dynid_io::columns::{ColumnNames, ColumnUse, SignalSpec};
+use dynid_logs::ColumnMapping;
+use dynid_logs::columns::{ColumnNames, ColumnUse, SignalSpec};
 
 use super::question::in_unit;
 use crate::log::Log;

@@ -8,7 +8,7 @@ mod toml_text;
 
 use std::path::{Path, PathBuf};
 
-use dynid_io::MappingSpec;
+use dynid_logs::MappingSpec;
 
 use crate::config::{Config, LogConfig};
 use crate::log::Log;

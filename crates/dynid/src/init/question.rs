@@ -1,10 +1,10 @@
 //! What logs do not tell.
 
-use dynid_io::LogFileError;
-use dynid_io::columns::{
+use dynid_logs::LogFileError;
+use dynid_logs::columns::{
     ColumnNames, FullSignal, MappingError, MappingSpec, Signal, SignalSpec, Units, holds_currents,
 };
-use dynid_io::log::{DecimalMark, Missing};
+use dynid_logs::log::{DecimalMark, Missing};
 
 use crate::Error;
 use crate::robot::Robot;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynid_io::columns::{ColumnUse, TimeSource};
-use dynid_io::log::{DecimalMark, Missing};
+use dynid_logs::columns::{ColumnUse, TimeSource};
+use dynid_logs::log::{DecimalMark, Missing};
 
 use super::columns::names;
 use super::toml_text::quoted;

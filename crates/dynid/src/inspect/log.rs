@@ -1,8 +1,8 @@
 //! What a log holds.
 
-use dynid_io::columns::{Signal, is_held, signal_of_name};
-use dynid_io::log::{LogFormat, Missing};
-use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Table};
+use dynid_logs::columns::{Signal, is_held, signal_of_name};
+use dynid_logs::log::{LogFormat, Missing};
+use dynid_logs::{ColumnMapping, MappingSpec, ReadingNote, Table};
 use serde::Serialize;
 
 use crate::Error;

@@ -16,7 +16,7 @@ pub(super) struct Asked {
     /// Settings of the session.
     pub(super) online: OnlineConfig,
     /// Columns of sources that say nothing else.
-    pub(super) columns: dynid_io::MappingSpec,
+    pub(super) columns: dynid_logs::MappingSpec,
     /// Transmission between logged motors and joints.
     pub(super) motor_side: Option<MotorSide>,
     /// Files and settings that the state of a session depends on, as text.

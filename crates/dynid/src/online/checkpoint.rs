@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use dynid_config::sealed;
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveSettings;
+use dynid_rows::conditioning::LiveRowSettings;
 use dynid_words::Transfer;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +14,7 @@ use super::learning::{Learned, Structure};
 use super::running::Running;
 use super::samples::Samples;
 use super::usual::Innovations;
-use crate::{Error, sealed};
-use dynid_rows::conditioning::LiveRowSettings;
+use crate::Error;
 
 const SCHEMA: &str = "dynid-online-checkpoint/2";
 
@@ -146,7 +147,7 @@ impl Checkpoint {
 /// Differs between runs whose states differ.
 fn fingerprint(asked: &Asked, samples: &Samples) -> String {
     let text = format!("{} {} {:?}", crate::VERSION, asked.identity, samples.header());
-    dynid_io::digest::sha256(text.as_bytes())
+    dynid_files::digest::sha256(text.as_bytes())
 }
 
 fn transfer_clock(samples: &mut Samples, transfer: &mut Transfer<'_>) {

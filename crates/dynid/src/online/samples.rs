@@ -1,7 +1,7 @@
 //! From rows of a stream to samples of a model's outputs.
 
-use dynid_io::columns::TimeSource;
-use dynid_io::{ColumnMapping, LogHeader, MappingError, MappingSpec, Table};
+use dynid_logs::columns::TimeSource;
+use dynid_logs::{ColumnMapping, LogHeader, MappingError, MappingSpec, Table};
 use dynid_model::element::temperature_channel;
 
 use super::asked::Asked;

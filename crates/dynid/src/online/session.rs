@@ -1,6 +1,6 @@
 //! A stream from its first row to its end.
 
-use dynid_io::{LogHeader, MappingSpec};
+use dynid_logs::{LogHeader, MappingSpec};
 use dynid_model::EffortModel;
 
 use super::asked::Asked;

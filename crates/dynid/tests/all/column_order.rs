@@ -1,4 +1,4 @@
-//! Numbered columns on robots with branches that are alike.
+//! Columns and joints: numbered ones on robots with branches that are alike, those of public logs.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
@@ -7,6 +7,8 @@ use std::path::Path;
 
 use dynid::Config;
 use dynid::check::{Check, Severity, check};
+use dynid::io::{ColumnMapping, MappingSpec, ReadOptions, csv, robot as robot_file};
+use dynid_testing::shared;
 
 /// A torso that turns with two arms of two joints; `right` first in the file, `left` first by name.
 fn robot(arms: &[&str]) -> String {
@@ -80,4 +82,44 @@ fn columns_with_names_or_an_order_that_was_stated_raise_no_doubt() {
     let stated = "[columns]\nposition = { right_shoulder = \"q3\", right_elbow = \"q4\", left_shoulder = \"q1\", left_elbow = \"q2\" }\n\
          effort = { right_shoulder = \"tau3\", right_elbow = \"tau4\", left_shoulder = \"tau1\", left_elbow = \"tau2\" }\n";
     none(&checked(&["right", "left"], &NUMBERS, stated));
+}
+
+#[test]
+fn public_logs_map_to_their_robots() {
+    let Some(data) = shared("data") else { return };
+    let cases = [
+        ("oracles/ur5.urdf", "oracles/logs/ur5_dev/train.csv.gz", ""),
+        ("oracles/ur5.urdf", "oracles/logs/ur5_dev/valid_fourier_clean.csv.gz", ""),
+        ("oracles/iiwa14.urdf", "oracles/logs/iiwa_250/train.csv.gz", ""),
+        ("kinova-gen3/gen3.urdf", "kinova-gen3/Trajectory1.csv.gz", ""),
+        ("panda-gaz2019/panda_kinematics.urdf", "panda-gaz2019/exciting_trajectory.csv.gz", ""),
+        ("ur10-unisa/ur10_kinematics.urdf", "ur10-unisa/exciting_trajectory.csv.gz", ""),
+        ("rokae-xmate/xmate_kinematics.urdf", "rokae-xmate/run_a.csv.gz", "rate_hz = 1000"),
+        (
+            "ur10e-innopolis/ur10e.urdf",
+            "ur10e-innopolis/20_02_05-20sec_8harm.csv.gz",
+            "current_gains = [15, 15, 11, 11, 11, 11]",
+        ),
+        (
+            "staubli-tx40/tx40.urdf",
+            "staubli-tx40/motor_log.csv.gz",
+            "rate_hz = 5000\ncurrent_gains = [1, 1, 1, 1, 1, 1]",
+        ),
+    ];
+    for (urdf, log, spec) in cases {
+        let robot = robot_file::read(data.join(urdf)).unwrap().description;
+        let moving: Vec<String> = robot
+            .joints
+            .iter()
+            .filter(|j| j.kind != dynid_model::JointKind::Fixed)
+            .map(|j| j.name.clone())
+            .collect();
+        let table = csv::read(data.join(log), &ReadOptions::default()).unwrap();
+        let spec: MappingSpec = toml::from_str(spec).unwrap();
+        let mapping =
+            ColumnMapping::from_spec(&table.header, &moving, &spec).unwrap_or_else(|e| panic!("{log}: {e}"));
+        let signals = mapping.extract(&table).unwrap();
+        assert_eq!((signals.position.len(), signals.time.len()), (moving.len(), table.rows), "{log}");
+        assert!(signals.effort.is_some() && table.rows > 100, "{log}");
+    }
 }

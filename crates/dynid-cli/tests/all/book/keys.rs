@@ -27,8 +27,8 @@ const PAGES: [Keys; 7] = [
                   [The run configuration](../files/run.md).",
         top: "Config",
         sources: &[
-            "crates/dynid/src/config.rs",
-            "crates/dynid/src/config",
+            "crates/dynid-config/src/config.rs",
+            "crates/dynid-config/src/config",
             SETTINGS,
             PER_JOINT,
             KNOWN_FRICTION,
@@ -43,9 +43,9 @@ const PAGES: [Keys; 7] = [
         opening: "Read by `design`. An example with comments: [The design file](../files/design.md).",
         top: "DesignConfig",
         sources: &[
-            "crates/dynid/src/design",
-            "crates/dynid/src/config.rs",
-            "crates/dynid/src/config",
+            "crates/dynid-experiments/src/design",
+            "crates/dynid-config/src/config.rs",
+            "crates/dynid-config/src/config",
             SETTINGS,
             PER_JOINT,
             KNOWN_FRICTION,
@@ -58,28 +58,28 @@ const PAGES: [Keys; 7] = [
         title: "Keys of a motion file",
         opening: "Read by `motion`. An example with comments: [motion](../commands/motion.md).",
         top: "MotionConfig",
-        sources: &["crates/dynid/src/motions", PER_JOINT],
+        sources: &["crates/dynid-experiments/src/motions", PER_JOINT],
     },
     Keys {
         page: "friction",
         title: "Keys of a friction experiment",
         opening: "Read by `friction`. An example with comments: [The file of a friction experiment](../files/friction.md).",
         top: "FrictionConfig",
-        sources: &["crates/dynid/src/friction", "crates/dynid/src/config.rs", MOTOR_SIDE, COLUMNS],
+        sources: &["crates/dynid/src/friction", "crates/dynid-config/src/config.rs", MOTOR_SIDE, COLUMNS],
     },
     Keys {
         page: "servo",
         title: "Keys of drives from commands and positions",
         opening: "Read by `servo`. An example with comments: [servo](../commands/servo.md).",
         top: "ServoConfig",
-        sources: &["crates/dynid/src/servo", PER_JOINT, COLUMNS],
+        sources: &["crates/dynid-drives/src", PER_JOINT, COLUMNS],
     },
     Keys {
         page: "simulate",
         title: "Keys of a virtual experiment",
         opening: "Read by `simulate --config`. An example with comments: [simulate](../commands/simulate.md).",
         top: "SimulateSettings",
-        sources: &["crates/dynid/src/simulate"],
+        sources: &["crates/dynid-experiments/src/simulate"],
     },
     Keys {
         page: "robot",
@@ -88,16 +88,16 @@ const PAGES: [Keys; 7] = [
                   element's settings: [Elements at joints](../theory/elements.md#shape-parameters), [Elastic joints](../theory/elastic.md), \
                   [Joints with clearance](../theory/clearance.md).",
         top: "RobotToml",
-        sources: &["crates/dynid-io/src/toml_robot"],
+        sources: &["crates/dynid-robots/src/toml_robot"],
     },
 ];
 
-const SETTINGS: &str = "crates/dynid-identify/src/settings";
+const SETTINGS: &str = "crates/dynid-setup/src/settings";
 const MOTOR_SIDE: &str = "crates/dynid-identify/src/estimate/reading.rs";
-const COLUMNS: &str = "crates/dynid-io/src/columns";
-const COUPLING: &str = "crates/dynid-io/src/toml_robot/schema.rs";
-const PER_JOINT: &str = "crates/dynid-identify/src/per_joint.rs";
-const KNOWN_FRICTION: &str = "crates/dynid-identify/src/known_friction.rs";
+const COLUMNS: &str = "crates/dynid-logs/src/columns";
+const COUPLING: &str = "crates/dynid-robots/src/toml_robot/schema.rs";
+const PER_JOINT: &str = "crates/dynid-setup/src/per_joint.rs";
+const KNOWN_FRICTION: &str = "crates/dynid-setup/src/known_friction.rs";
 
 /// `DYNID_WRITE_KEYS=1 cargo test -p dynid-cli --test all keys_of_files` writes the pages anew.
 #[test]

@@ -1,0 +1,292 @@
+//! What simulators and firmware take: the robot file with what was found, tables of actuators, a C header.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use dynid_export::Source;
+use dynid_identify::Error;
+use dynid_identify::robot::Robot;
+use dynid_robots::mjcf::{self, JointParameters};
+use dynid_robots::urdf::{self, JointDynamics};
+use dynid_servo::identify::EffortUse;
+use dynid_servo::{Channel, ServoJoint, Term};
+use serde_json::{Value, json};
+
+use super::ServoResult;
+
+/// Files of an identification, by name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoFiles {
+    /// Name and text.
+    pub files: Vec<(String, String)>,
+    /// What they cannot hold, in words.
+    pub notes: Vec<String>,
+}
+
+/// Friction and rotors that the robot file states.
+pub fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
+    let text = || dynid_files::input::read_text(&robot.path);
+    let read = |source| Error::Read { file: robot.path.clone(), source };
+    if robot.file.mjcf.is_some() {
+        return Ok(mjcf::parse(&text().map_err(read)?, &robot.path)?.joints);
+    }
+    let Some(file) = &robot.file.urdf else { return Ok(Vec::new()) };
+    let text = dynid_files::input::read_text(Path::new(file)).map_err(read)?;
+    let of = |d: JointDynamics| JointParameters {
+        joint: d.joint,
+        damping: d.damping,
+        friction_loss: d.friction,
+        armature: 0.0,
+    };
+    Ok(urdf::dynamics(&text, file)?.into_iter().map(of).collect())
+}
+
+impl ServoFiles {
+    /// Names of the files of [`ServoResult::files`], in their order.
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`], [`Error::Read`].
+    pub fn names(robot: &Path) -> Result<Vec<String>, Error> {
+        let source = Source::read(robot)?;
+        let name = |part: Option<&std::ffi::OsStr>| {
+            part.map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+        };
+        let (file, stem) = (name(robot.file_name()), name(robot.file_stem()));
+        let mut out = Vec::new();
+        if source.is_mjcf() {
+            out.push(file);
+            out.extend(source.included().into_iter().map(str::to_owned));
+        } else {
+            if source.urdf_text().is_some() {
+                out.push(format!("{stem}.urdf"));
+            }
+            out.push(format!("{stem}.mujoco.xml"));
+        }
+        out.extend(["actuators.xml", "actuators.json", "actuators.h"].map(str::to_owned));
+        Ok(out)
+    }
+}
+
+impl ServoResult {
+    /// The files that other programs take:
+    ///
+    /// | file | what |
+    /// |---|---|
+    /// | the robot file's name | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, else byte for byte |
+    /// | `NAME.mujoco.xml` | for robots that are no MJCF: the robot in MJCF with its actuators |
+    /// | `actuators.xml` | MJCF `<actuator>`: one affine actuator per joint, for `<include>` |
+    /// | `actuators.json` | stiffness, damping, armature, friction, limits, delay, zero and direction by joint, for simulators of many robots |
+    /// | `actuators.h` | the same as C arrays |
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`] if the robot cannot be stated.
+    pub fn files(&self) -> Result<ServoFiles, Error> {
+        let source = Source::read(&self.robot.path)?;
+        let names = self.robot.rate_names();
+        let joints: Vec<JointParameters> = names
+            .iter()
+            .zip(&self.found.values.joints)
+            .map(|(name, j)| JointParameters {
+                joint: name.clone(),
+                damping: j.get(Term::Viscous),
+                friction_loss: j.get(Term::Coulomb),
+                armature: j.get(Term::RotorInertia),
+            })
+            .collect();
+        let mut files = Vec::new();
+        let name = self.robot.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let stem = self.robot.path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let actuators = self.actuators_xml(&names);
+        if let Some(text) = source.mjcf_text() {
+            let mut edited = mjcf::edit(text, &self.robot.path, &[], &joints)?;
+            files.push((name.clone(), edited.remove(0).text));
+            let folder = self.robot.path.parent().unwrap_or(Path::new(""));
+            for included in source.included() {
+                let text = match edited.iter().find(|f| f.name == included) {
+                    Some(file) => file.text.clone(),
+                    None => {
+                        let path = folder.join(included);
+                        dynid_files::input::read_text(&path)
+                            .map_err(|source| Error::Read { file: path, source })?
+                    }
+                };
+                files.push((included.to_owned(), text));
+            }
+        } else {
+            if let Some(text) = source.urdf_text() {
+                let dynamics: Vec<JointDynamics> = joints
+                    .iter()
+                    .map(|p| JointDynamics {
+                        joint: p.joint.clone(),
+                        damping: p.damping,
+                        friction: p.friction_loss,
+                    })
+                    .collect();
+                files.push((format!("{stem}.urdf"), urdf::edit(text, &name, &[], &dynamics)?));
+            }
+            let text = mjcf::from_description(source.description(), &joints)?;
+            files.push((format!("{stem}.mujoco.xml"), with_actuators(&text, &actuators, &names)));
+        }
+        files.push(("actuators.xml".to_owned(), format!("<mujoco>\n{actuators}</mujoco>\n")));
+        let table = serde_json::to_string_pretty(&self.table(&names)).unwrap_or_default();
+        files.push(("actuators.json".to_owned(), table + "\n"));
+        files.push(("actuators.h".to_owned(), self.header(&names)));
+        Ok(ServoFiles { files, notes: self.left_out(&names) })
+    }
+
+    /// What damping, friction loss, armature and affine actuators cannot say.
+    fn left_out(&self, names: &[String]) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut note = |term: Term, what: &str| {
+            let has = |(name, j): (&String, &ServoJoint)| (j.get(term) != term.none()).then(|| name.clone());
+            let with: Vec<String> = names.iter().zip(&self.found.values.joints).filter_map(has).collect();
+            if !with.is_empty() {
+                notes.push(format!("{what}: {}", with.join(", ")));
+            }
+        };
+        note(
+            Term::LoadFriction,
+            "friction that grows with the load has no place in MJCF and URDF, Coulomb friction alone is written",
+        );
+        note(
+            Term::Stiction,
+            "friction at rest has no place in MJCF and URDF, Coulomb friction alone is written",
+        );
+        note(Term::Delay, "delay the commands by the seconds that actuators.json states");
+        note(Term::DeadBand, "dead bands are in actuators.json alone");
+        note(Term::RateLimit, "rate limits of commands are in actuators.json alone");
+        note(Term::SmoothingTime, "smoothing of commands is in actuators.json alone");
+        notes
+    }
+
+    /// `<actuator>` with one affine actuator per joint: `force = gain · ctrl + bias`, `ctrl` the command as it stands in the log.
+    fn actuators_xml(&self, names: &[String]) -> String {
+        let mut out = String::from("  <actuator>\n");
+        for (name, j) in names.iter().zip(&self.found.values.joints) {
+            let (kp, kd) = (j.get(Term::PositionGain), j.get(Term::VelocityGain));
+            let constant = kp * j.get(Term::Zero) - j.get(Term::Offset);
+            let limit = j.get(Term::EffortLimit);
+            let range = match limit.is_finite() {
+                true => format!(" forcelimited=\"true\" forcerange=\"{} {limit}\"", -limit),
+                false => String::new(),
+            };
+            let delay = match j.get(Term::Delay) {
+                0.0 => String::new(),
+                d => format!(" <!-- delay {d} s -->"),
+            };
+            let name = dynid_robots::mjcf::escaped(name);
+            let _infallible = writeln!(
+                out,
+                "    <general name=\"servo_{name}\" joint=\"{name}\" gaintype=\"fixed\" biastype=\"affine\" gainprm=\"{}\" \
+                 biasprm=\"{constant} {} {}\"{range}/>{delay}",
+                kp * j.direction,
+                -kp,
+                -kd
+            );
+        }
+        out + "  </actuator>\n"
+    }
+
+    fn table(&self, names: &[String]) -> Value {
+        let told_constant = |name: &str| {
+            let told = |e: &&EffortUse| e.channel == Channel::Current && e.verdict.is_taken();
+            self.found.efforts.iter().filter(told).any(|e| names[e.joint] == name)
+        };
+        let rows: Vec<Value> = names
+            .iter()
+            .zip(&self.found.values.joints)
+            .map(|(name, j)| {
+                let finite = |term: Term| Some(j.get(term)).filter(|x| x.is_finite());
+                json!({
+                    "joint": name,
+                    "stiffness": j.get(Term::PositionGain),
+                    "damping": j.get(Term::VelocityGain),
+                    "armature": j.get(Term::RotorInertia),
+                    "friction": j.get(Term::Coulomb),
+                    "static_friction": j.get(Term::Coulomb) + j.get(Term::Stiction),
+                    "stribeck_velocity": (j.get(Term::Stiction) > 0.0).then(|| j.get(Term::StribeckVelocity)),
+                    "load_friction": j.get(Term::LoadFriction),
+                    "viscous_friction": j.get(Term::Viscous),
+                    "effort_offset": j.get(Term::Offset),
+                    "effort_limit": finite(Term::EffortLimit),
+                    "delay": j.get(Term::Delay),
+                    "dead_band": j.get(Term::DeadBand),
+                    "rate_limit": finite(Term::RateLimit),
+                    "smoothing_time": j.get(Term::SmoothingTime),
+                    "torque_constant": told_constant(name).then(|| j.get(Term::TorqueConstant)),
+                    "zero": j.get(Term::Zero),
+                    "direction": j.direction,
+                })
+            })
+            .collect();
+        json!({
+            "schema": 1,
+            "robot": self.robot.file.description.name,
+            "about": "effort = stiffness (direction command + zero - q) - damping dq; friction, armature and offset act against it; command \
+                      delayed; units N m, rad, s, for joints that slide N, m, s; torque_constant in N m/A",
+            "joints": rows,
+        })
+    }
+
+    fn header(&self, names: &[String]) -> String {
+        let joints = &self.found.values.joints;
+        let mut out = String::from(
+            "/* Drives as identified from commands and positions. Units: N m, rad, s; for joints that slide N, m, s.\n \
+             * effort = position_gain (direction command + zero - q) - velocity_gain dq, command delayed;\n \
+             * rotor_inertia, viscous, coulomb and offset act against it. */\n#ifndef DYNID_ACTUATORS_H\n#define DYNID_ACTUATORS_H\n\n",
+        );
+        let _infallible = writeln!(out, "#define DYNID_JOINTS {}\n", names.len());
+        let quoted: Vec<String> = names.iter().map(|n| format!("\"{}\"", n.escape_default())).collect();
+        let _infallible =
+            writeln!(out, "static const char *const dynid_joint[DYNID_JOINTS] = {{{}}};", quoted.join(", "));
+        let terms = [
+            Term::PositionGain,
+            Term::VelocityGain,
+            Term::RotorInertia,
+            Term::Viscous,
+            Term::Coulomb,
+            Term::Stiction,
+            Term::StribeckVelocity,
+            Term::LoadFriction,
+            Term::Offset,
+            Term::Zero,
+            Term::Delay,
+        ];
+        for term in terms {
+            let values: Vec<String> = joints.iter().map(|j| format!("{:?}", j.get(term))).collect();
+            let _infallible = writeln!(
+                out,
+                "static const double dynid_{}[DYNID_JOINTS] = {{{}}};",
+                term.name(),
+                values.join(", ")
+            );
+        }
+        let directions: Vec<String> = joints.iter().map(|j| format!("{:?}", j.direction)).collect();
+        let _infallible = writeln!(
+            out,
+            "static const double dynid_direction[DYNID_JOINTS] = {{{}}};",
+            directions.join(", ")
+        );
+        out + "\n#endif\n"
+    }
+}
+
+/// An MJCF of ours with other actuators: motors of joints that have one give way to it.
+fn with_actuators(text: &str, actuators: &str, names: &[String]) -> String {
+    let joints: Vec<String> =
+        names.iter().map(|n| format!("joint=\"{}\"", dynid_robots::mjcf::escaped(n))).collect();
+    let mut out = String::with_capacity(text.len() + actuators.len());
+    let mut placed = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("<motor ") && joints.iter().any(|j| line.contains(j)) {
+            continue;
+        }
+        if line.trim() == "</mujoco>" && !placed {
+            out += actuators;
+            placed = true;
+        }
+        out += line;
+        out.push('\n');
+    }
+    out
+}

@@ -1,0 +1,280 @@
+//! Virtual fleets: robots that differ, logs that scatter, wear that grows, faults and broken logs, with the truth beside them.
+
+use std::collections::BTreeMap;
+
+use dynid_identify::Error;
+use dynid_identify::robot::Robot;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::fleet_table::FleetTable;
+use super::{SimulateMode, SimulateSettings, SimulatedLog, nominal, simulate};
+
+/// Seconds of a day.
+const DAY: f64 = 86_400.0;
+/// When a virtual fleet begins: 2026-01-01, s since 1970.
+const FIRST_DAY: f64 = 1_767_225_600.0;
+/// Temperature about which the season swings, degrees Celsius.
+const TEMPERATURE: f64 = 25.0;
+/// Deviation of a robot that stands out, in standard deviations of its fleet.
+const OUTLIER: f64 = 8.0;
+/// Deviation of a broken log, in standard deviations of its robot's logs.
+const BROKEN: f64 = 15.0;
+
+/// A change that was put into a robot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlannedChange {
+    /// Robot.
+    pub robot: String,
+    /// Parameter.
+    pub parameter: String,
+    /// `step` or `ramp`.
+    pub kind: &'static str,
+    /// Change at the end, in the unit of the parameter.
+    pub size: f64,
+    /// When it happens or begins, s since 1970.
+    pub date_s: f64,
+}
+
+/// A virtual fleet; its logs are made one by one, each alone if need be.
+#[derive(Debug, Clone)]
+pub struct VirtualFleet {
+    settings: SimulateSettings,
+    table: FleetTable,
+    /// Parameters of the type.
+    pub nominal: Vec<(String, f64)>,
+    /// Per robot: parameters.
+    robots: Vec<BTreeMap<String, f64>>,
+    /// Changes that were put in.
+    pub changes: Vec<PlannedChange>,
+    /// Robots that stand out.
+    pub outliers: Vec<String>,
+}
+
+/// What is known of a virtual log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VirtualLog {
+    /// Robot.
+    pub robot: String,
+    /// File name.
+    pub file: String,
+    /// Start, s since 1970.
+    pub start_s: f64,
+    /// Temperature, degrees Celsius; absent if the season has no swing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<f64>,
+    /// Joint in which the log is broken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub broken: Option<String>,
+    /// Parameters of the joints in this log.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+fn normal(rng: &mut impl Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Name of a robot.
+fn name(r: usize) -> String {
+    format!("r{:03}", r + 1)
+}
+
+/// Joint and symbol of a parameter.
+fn parts(parameter: &str) -> (&str, &str) {
+    parameter.rsplit_once('.').unwrap_or(("", parameter))
+}
+
+impl VirtualFleet {
+    /// Draws robots and changes; `settings.fleet` says which.
+    ///
+    /// # Errors
+    /// As [`simulate`]; [`Error::Setting`] for a symbol that no parameter has.
+    pub fn new(robot: &Robot, settings: &SimulateSettings) -> Result<VirtualFleet, Error> {
+        let table = settings.fleet.clone().unwrap_or_default();
+        table.check()?;
+        if settings.mode == SimulateMode::ClosedLoop {
+            return Err(Error::setting("mode", "inverse dynamics for a fleet", "closed_loop"));
+        }
+        let nominal = nominal(robot, settings)?;
+        for symbol in
+            table.between_robots.keys().chain(table.between_logs.keys()).chain(table.per_kelvin.keys())
+        {
+            if !nominal.iter().any(|(parameter, _)| parts(parameter).1 == symbol) {
+                // What is there by default may be lacking in the robot.
+                let usual = FleetTable::default();
+                let stated = [
+                    (&table.between_robots, &usual.between_robots),
+                    (&table.between_logs, &usual.between_logs),
+                    (&table.per_kelvin, &usual.per_kelvin),
+                ];
+                if stated.iter().any(|(own, usual)| own.contains_key(symbol) && own != usual) {
+                    return Err(Error::setting("fleet", "symbols of parameters that the robot has", symbol));
+                }
+            }
+        }
+        let mut out = VirtualFleet {
+            settings: settings.clone(),
+            table,
+            nominal,
+            robots: Vec::new(),
+            changes: Vec::new(),
+            outliers: Vec::new(),
+        };
+        out.draw();
+        Ok(out)
+    }
+
+    /// Size of a parameter that shares count from.
+    fn size(&self, parameter: &str) -> f64 {
+        let of = |name: &str| self.nominal.iter().find(|(p, _)| p == name).map_or(0.0, |(_, v)| v.abs());
+        match parts(parameter) {
+            (joint, "fo") => of(&format!("{joint}.fc")),
+            _ => of(parameter),
+        }
+    }
+
+    fn joints(&self) -> Vec<String> {
+        let mut out: Vec<String> = Vec::new();
+        for (parameter, _) in &self.nominal {
+            let (joint, symbol) = parts(parameter);
+            if self.table.between_robots.contains_key(symbol) && !out.iter().any(|j| j == joint) {
+                out.push(joint.to_owned());
+            }
+        }
+        out
+    }
+
+    fn draw(&mut self) {
+        let table = self.table.clone();
+        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        let mut left: Vec<usize> = (0..table.robots).collect();
+        let joints = self.joints();
+        let mut take = |rng: &mut ChaCha8Rng| left.swap_remove(rng.random_range(0..left.len()));
+        let outliers: Vec<(usize, usize)> = match joints.len() {
+            0 => Vec::new(),
+            n => (0..table.outliers).map(|_| (take(&mut rng), rng.random_range(0..n))).collect(),
+        };
+        for n in 0..if joints.is_empty() { 0 } else { table.wear + table.faults } {
+            let robot = name(take(&mut rng));
+            let step = n >= table.wear;
+            let joint = &joints[rng.random_range(0..joints.len())];
+            let symbols: [&str; 2] = if step { ["fc", "fo"] } else { ["fc", "fv"] };
+            let mut parameter = format!("{joint}.{}", symbols[rng.random_range(0..2)]);
+            if !self.nominal.iter().any(|(p, _)| *p == parameter) {
+                parameter = format!("{joint}.fc");
+            }
+            let sign = if step && rng.random_bool(0.5) { -1.0 } else { 1.0 };
+            let share = if step { rng.random_range(0.2..0.4) } else { rng.random_range(0.3..0.6) };
+            let at = if step { rng.random_range(0.25..0.75) } else { rng.random_range(0.2..0.7) };
+            let size = sign * share * self.size(&parameter);
+            let kind = if step { "step" } else { "ramp" };
+            self.changes.push(PlannedChange {
+                robot,
+                parameter,
+                kind,
+                size,
+                date_s: FIRST_DAY + DAY * table.days * at,
+            });
+        }
+        for r in 0..table.robots {
+            let odd =
+                outliers.iter().find(|(robot, _)| *robot == r).map(|(_, joint)| joints[*joint].as_str());
+            let mut own = BTreeMap::new();
+            for (parameter, value) in &self.nominal {
+                let (joint, symbol) = parts(parameter);
+                let Some(spread) = table.between_robots.get(symbol) else { continue };
+                let draw = normal(&mut rng);
+                let draw = if odd == Some(joint) { OUTLIER.copysign(draw) } else { draw };
+                own.insert(parameter.clone(), value + spread * self.size(parameter) * draw);
+            }
+            self.robots.push(own);
+        }
+        self.outliers = outliers.iter().map(|(r, _)| name(*r)).collect();
+        self.outliers.sort();
+    }
+
+    /// Number of logs.
+    pub fn len(&self) -> usize {
+        self.table.robots * self.table.logs
+    }
+
+    /// Whether there are no logs.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What is known of log `index`, counted robot by robot.
+    ///
+    /// # Panics
+    /// Unless `index` is below [`Self::len`].
+    pub fn about(&self, index: usize) -> VirtualLog {
+        assert!(index < self.len(), "log {index} of {}", self.len());
+        let (r, l) = (index / self.table.logs, index % self.table.logs);
+        let robot = name(r);
+        let mut rng = self.rng(&format!("log {r} {l}"));
+        let at = (l as f64 + rng.random_range(0.05..0.95)) / self.table.logs as f64;
+        // Whole seconds, as a manifest has them.
+        let start_s = (FIRST_DAY + DAY * self.table.days * at).round();
+        let year = (start_s - FIRST_DAY) / (365.0 * DAY);
+        let season = self.table.season;
+        let temperature =
+            ((TEMPERATURE + season * (std::f64::consts::TAU * year).sin() + normal(&mut rng)) * 10.0).round()
+                / 10.0;
+        let joints = self.joints();
+        let hit = rng.random_range(0.0..1.0) < self.table.broken && !joints.is_empty();
+        let broken = hit.then(|| joints[rng.random_range(0..joints.len())].clone());
+        let mut parameters = self.robots[r].clone();
+        for (parameter, _) in &self.nominal {
+            let (joint, symbol) = parts(parameter);
+            let size = self.size(parameter);
+            let mut change = 0.0;
+            if let Some(spread) = self.table.between_logs.get(symbol) {
+                let draw = normal(&mut rng);
+                let draw = if broken.as_deref() == Some(joint) { BROKEN } else { draw };
+                change += spread * size * draw;
+            }
+            if season > 0.0 {
+                change += self.table.per_kelvin.get(symbol).copied().unwrap_or(0.0)
+                    * size
+                    * (temperature - TEMPERATURE);
+            }
+            for planned in self.changes.iter().filter(|c| c.robot == robot && c.parameter == *parameter) {
+                let end = FIRST_DAY + DAY * self.table.days;
+                let ramp = ((start_s - planned.date_s) / (end - planned.date_s)).max(0.0);
+                change += planned.size
+                    * if planned.kind == "step" { f64::from(start_s >= planned.date_s) } else { ramp };
+            }
+            if change != 0.0 {
+                *parameters.entry(parameter.clone()).or_insert_with(|| self.value(parameter)) += change;
+            }
+        }
+        let file = format!("{robot}-{:03}.csv.gz", l + 1);
+        let temperature = Some(temperature).filter(|_| season > 0.0);
+        VirtualLog { robot, file, start_s, temperature, broken, parameters }
+    }
+
+    fn value(&self, parameter: &str) -> f64 {
+        self.nominal.iter().find(|(p, _)| p == parameter).map_or(0.0, |(_, v)| *v)
+    }
+
+    /// Random numbers of a thing of the fleet: the same whatever else is made.
+    fn rng(&self, what: &str) -> ChaCha8Rng {
+        let hash = Sha256::digest(format!("{} {what}", self.settings.seed).as_bytes());
+        ChaCha8Rng::from_seed(hash.into())
+    }
+
+    /// Simulates log `index`, with a motion of its own.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn log(&self, robot: &Robot, index: usize) -> Result<SimulatedLog, Error> {
+        let VirtualLog { parameters, .. } = self.about(index);
+        let seed = self.rng(&format!("motion {index}")).random();
+        let mut values = self.settings.values.clone();
+        values.extend(parameters);
+        simulate(robot, &SimulateSettings { values, seed, fleet: None, ..self.settings.clone() })
+    }
+}

@@ -1,0 +1,24 @@
+//! Robot files: URDF, MJCF, SDF, robots in TOML (DH tables or body trees), meshes (STL, OBJ).
+//!
+//! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
+//! typed error whose `Display` is one line (file, line, column, expected, found) and whose `hint()` says what
+//! to do about it. Whether links and joints form a mechanism is decided by `dynid_model`, not here.
+
+pub mod mesh;
+pub mod mjcf;
+pub mod robot;
+mod robot_error;
+mod robot_numbers;
+pub mod sdf;
+mod source;
+mod tie;
+pub mod toml_robot;
+pub mod urdf;
+
+pub use mesh::{Mesh, MeshError};
+pub use robot_error::{Place, RobotFileError};
+pub use tie::{MirrorAxis, TieFault, TieSpec};
+pub use toml_robot::{
+    ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
+    ReactionLoad, ReactionSpec, RobotFile, SettingValue,
+};
