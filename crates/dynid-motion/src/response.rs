@@ -27,15 +27,20 @@ impl PeriodicResponse {
     /// A system with the response `G(jω) = re + j im` at `ω` rad/s, for signals of so many samples in one period, s. The response is asked for at
     /// `ω = 0` and the harmonics.
     pub fn new(samples: usize, period_s: f64, response: impl Fn(f64) -> (f64, f64)) -> Self {
-        let mut planner = RealFftPlanner::new();
-        let (forward, back) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let at = |k: usize| {
             let (re, im) = response(TAU * k as f64 / period_s);
             // The transform of real samples holds the constant and the highest harmonic of an even number as real numbers.
             let real = k == 0 || 2 * k == samples;
             Complex::new(re, if real { 0.0 } else { im }) / samples as f64
         };
-        PeriodicResponse { response: (0..=samples / 2).map(at).collect(), forward, back }
+        Self::planned(samples, (0..=samples / 2).map(at).collect())
+    }
+
+    /// Apart from what is generic: whoever plans a transform compiles all transforms.
+    fn planned(samples: usize, response: Vec<Complex<f64>>) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let (forward, back) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        PeriodicResponse { response, forward, back }
     }
 
     /// The system that goes backwards in time: its matrix over the samples is the transpose.

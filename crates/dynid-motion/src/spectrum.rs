@@ -1,9 +1,11 @@
 //! Power spectra, and what they say about sensor noise and excitation.
 
 use std::f64::consts::PI;
+use std::fmt;
+use std::sync::Arc;
 
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::median::{median, running_median};
 use crate::signal::{SignalError, check_finite, check_positive, check_signal};
@@ -81,16 +83,47 @@ pub fn welch(signal: &[f64], rate_hz: f64, segment: usize) -> Result<PowerSpectr
     Ok(PowerSpectrum { frequency, density })
 }
 
-/// `|X_k|²` of the discrete Fourier transform of a signal, `k` from 0 to half its length; `None` for an empty signal.
-pub fn periodogram(signal: &[f64]) -> Option<Vec<f64>> {
-    if signal.is_empty() {
-        return None;
+/// Periodograms of signals of one length.
+pub struct Periodogram {
+    transform: Arc<dyn RealToComplex<f64>>,
+    input: Vec<f64>,
+    bins: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+impl fmt::Debug for Periodogram {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Periodogram").field("samples", &self.input.len()).finish()
     }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(signal.len());
-    let mut input = signal.to_vec();
-    let mut bins = transform.make_output_vec();
-    transform.process(&mut input, &mut bins).ok()?;
-    Some(bins.iter().map(|c| c.norm_sqr()).collect())
+}
+
+impl Periodogram {
+    /// Plans the transform of signals of so many samples, of one at least.
+    pub fn new(samples: usize) -> Self {
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(samples.max(1));
+        Periodogram {
+            input: transform.make_input_vec(),
+            bins: transform.make_output_vec(),
+            scratch: transform.make_scratch_vec(),
+            transform,
+        }
+    }
+
+    /// `|X_k|²` of the discrete Fourier transform of a signal, `k` from 0 to half its length.
+    ///
+    /// # Panics
+    /// If the signal has another number of samples.
+    pub fn of(&mut self, signal: &[f64]) -> Vec<f64> {
+        self.input.copy_from_slice(signal);
+        let done = self.transform.process_with_scratch(&mut self.input, &mut self.bins, &mut self.scratch);
+        assert!(done.is_ok(), "buffers of the plan itself");
+        self.bins.iter().map(|c| c.norm_sqr()).collect()
+    }
+}
+
+/// The [`Periodogram`] of one signal; `None` for an empty one.
+pub fn periodogram(signal: &[f64]) -> Option<Vec<f64>> {
+    (!signal.is_empty()).then(|| Periodogram::new(signal.len()).of(signal))
 }
 
 /// `Σ_k x_k x_{k+i}` for every lag `i`, by the transform of the padded signal; `None` for an empty signal.

@@ -46,15 +46,36 @@ fn run_fused_avx2(task: impl FusedTask) {
 /// Runs a task with fused multiply-add on AVX2 where the processor has it, else with what every x86-64 has.
 pub fn run_on_lanes(task: impl LaneTask) {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        #[expect(unsafe_code, reason = "the features that the function is compiled for were just detected")]
-        // SAFETY: both target features are present.
-        unsafe {
-            run_avx2(task);
-        }
-        return;
-    }
+    let Some(task) = on_avx2(task) else { return };
     run_plain(task);
+}
+
+/// Runs a task on lanes that the processor has; gives it back where it has none, as an x86-64 without AVX2.
+///
+/// For large tasks, of which no second version on lanes is compiled for such processors: one sample after the other does for them.
+#[must_use]
+pub fn run_on_wide_lanes<T: LaneTask>(task: T) -> Option<T> {
+    #[cfg(target_arch = "x86_64")]
+    return on_avx2(task);
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        run_plain(task);
+        None
+    }
+}
+
+/// Runs a task with AVX2 and fused multiply-add, or gives it back.
+#[cfg(target_arch = "x86_64")]
+fn on_avx2<T: LaneTask>(task: T) -> Option<T> {
+    if !(std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")) {
+        return Some(task);
+    }
+    #[expect(unsafe_code, reason = "the features that the function is compiled for were just detected")]
+    // SAFETY: both target features are present.
+    unsafe {
+        run_avx2(task);
+    }
+    None
 }
 
 #[cfg(target_arch = "x86_64")]

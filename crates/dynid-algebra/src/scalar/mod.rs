@@ -13,7 +13,7 @@ mod sine;
 pub use cross::Cross;
 pub use curve::{Curve, map_curve, map_decay};
 pub use dispatch::{FusedTask, run_fused};
-pub use dispatch::{LANES, LaneTask, run_on_lanes};
+pub use dispatch::{LANES, LaneTask, run_on_lanes, run_on_wide_lanes};
 pub use dual::Dual;
 pub use function::{Function, FunctionOfTwo, SmoothSign, sign};
 pub use jet::Jet;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::RealFftPlanner;
+use dynid_motion::spectrum::Periodogram;
 
 use super::Row;
 
@@ -31,10 +31,8 @@ pub(super) fn spectrum(rows: &[Row], kernel_s: f64, range: (f64, f64), orders: (
     let most = orders.1.min(LONGEST * FINE / length);
     let points = ((length * most / FINE) as usize).max(64).next_power_of_two();
     let (step, spacing) = (TAU / length, length / points as f64);
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(points);
-    let mut grids = [transform.make_input_vec(), transform.make_input_vec()];
-    let mut lines = [transform.make_output_vec(), transform.make_output_vec()];
-    let mut scratch = transform.make_scratch_vec();
+    let mut powers = Periodogram::new(points);
+    let mut grids = [vec![0.0; points], vec![0.0; points]];
     let total: f64 = rows.iter().map(|row| (row.weight * row.residual).powi(2)).sum();
     let mut out = Vec::new();
     let mut low = orders.0;
@@ -58,11 +56,7 @@ pub(super) fn spectrum(rows: &[Row], kernel_s: f64, range: (f64, f64), orders: (
                 grid[first + 1] += rest * value;
             }
         }
-        for (grid, line) in grids.iter_mut().zip(&mut lines) {
-            if transform.process_with_scratch(grid, line, &mut scratch).is_err() {
-                return Vec::new();
-            }
-        }
+        let lines = grids.each_ref().map(|grid| powers.of(grid));
         let (first, last) = ((low / step).ceil() as usize, (high / step).ceil() as usize);
         if squares > 0.0 && total > 0.0 {
             out.extend((first..last.min(points / 2)).map(|k| {
@@ -70,9 +64,7 @@ pub(super) fn spectrum(rows: &[Row], kernel_s: f64, range: (f64, f64), orders: (
                 let half = 0.5 * order * spacing;
                 // Sharing a row by two points dampens it by this.
                 let shared = (half.sin() / half).powi(4);
-                let share = |line: &[realfft::num_complex::Complex<f64>]| {
-                    2.0 * line[k].norm_sqr() / (shared * squares * total)
-                };
+                let share = |line: &[f64]| 2.0 * line[k] / (shared * squares * total);
                 Line { order, shares: [share(&lines[0]), share(&lines[1])] }
             }));
         }

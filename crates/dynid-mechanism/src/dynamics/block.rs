@@ -2,7 +2,7 @@
 
 use super::{Dynamics, State, inverse_dynamics, regressor};
 use crate::motion_block::MotionBlock;
-use dynid_algebra::scalar::{LANES, LaneTask, Scalar, run_on_lanes};
+use dynid_algebra::scalar::{LANES, LaneTask, Scalar, run_on_wide_lanes};
 use dynid_algebra::spatial::Vec3;
 
 /// Where the entries of a regressor block go: slot `k` holds one entry of all samples.
@@ -151,9 +151,11 @@ impl Dynamics {
     ) {
         assert_eq!(inertias.len(), 10 * self.bodies, "length of inertias");
         assert!(stride >= motion.samples, "stride shorter than the block");
+        let mut effort = effort;
         if motion.samples >= LANES && self.follows.is_none() {
-            run_on_lanes(InverseDynamicsTask { dynamics: self, motion, inertias, stride, effort });
-            return;
+            let task = InverseDynamicsTask { dynamics: self, motion, inertias, stride, effort };
+            let Some(left) = run_on_wide_lanes(task) else { return };
+            effort = left.effort;
         }
         let mut work = self.workspace();
         let mut out = vec![0.0; self.rates];
@@ -167,17 +169,15 @@ impl Dynamics {
 
     /// Regressor entries of all samples of a block, `out[slot * stride + s]`, at joint level (mimic coupling is left to
     /// the caller). Slots that no entry goes to are not written.
-    pub fn regressor_block(
-        &self,
-        motion: &MotionBlock<'_>,
-        slots: &Slots,
-        stride: usize,
-        out: &mut [f64],
-    ) {
+    pub fn regressor_block(&self, motion: &MotionBlock<'_>, slots: &Slots, stride: usize, out: &mut [f64]) {
         debug_assert!(self.follows.is_none(), "coupled joints are folded by the caller");
+        let mut out = out;
         if motion.samples >= LANES {
-            run_on_lanes(RegressorTask { dynamics: self, motion, slots, stride, out });
-            return;
+            let Some(left) = run_on_wide_lanes(RegressorTask { dynamics: self, motion, slots, stride, out })
+            else {
+                return;
+            };
+            out = left.out;
         }
         let mut work = regressor::RegressorWorkspace::new(&self.tree);
         self.each_sample(motion, |sample, state| {

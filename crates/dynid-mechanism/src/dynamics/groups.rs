@@ -1,6 +1,6 @@
 //! Blocks of any length: lanes where there are enough samples, one after the other where not.
 
-use dynid_algebra::scalar::{FusedTask, LANES, LaneTask, Lanes, Scalar, run_fused, run_on_lanes};
+use dynid_algebra::scalar::{FusedTask, LANES, LaneTask, Lanes, Scalar, run_fused, run_on_wide_lanes};
 
 /// Work on groups of `width` consecutive samples, each group read as one number.
 pub(super) trait GroupTask {
@@ -29,9 +29,12 @@ impl<T: GroupTask> FusedTask for OneByOne<T> {
     }
 }
 
-/// Runs a task on lanes, or sample after sample where there are too few of them.
+/// Runs a task on lanes, or sample after sample where there are too few of them or the processor has no lanes.
 pub(super) fn run(samples: usize, task: impl GroupTask) {
-    if samples >= LANES { run_on_lanes(OnLanes(task)) } else { run_fused(OneByOne(task)) }
+    let left = if samples >= LANES { run_on_wide_lanes(OnLanes(task)) } else { Some(OnLanes(task)) };
+    if let Some(OnLanes(task)) = left {
+        run_fused(OneByOne(task));
+    }
 }
 
 /// First sample of every group of `width`, and how many of its samples the group before has done.
