@@ -1,9 +1,11 @@
-//! Work that takes a robot by its file: pre-flight, designs, identification on line.
+//! Work beside identification: pre-flight, comparisons, drive gains, drives, designs, identification on line.
 
 use std::sync::{Mutex, PoisonError};
 
+use dynid::compare::compare_logs;
 use dynid::config::Config;
 use dynid::design::{DesignConfig, DesignStep, design as run_design};
+use dynid::gains::gains_of_logs;
 use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
 use dynid::pipeline::held_where_not_logged;
@@ -37,6 +39,50 @@ pub(crate) fn check(
         preflight::of_logs(&settings, &held, &logs, &Overlaps::of(&logs, &[]))
     })?;
     as_json(&findings)
+}
+
+/// Compares all estimators on logs: the record as JSON, and the page.
+#[pyfunction]
+#[pyo3(signature = (robot, logs, settings_json, *, progress=None, threads=0))]
+pub(crate) fn compare(
+    py: Python<'_>,
+    robot: &Robot,
+    logs: Vec<PyRef<'_, Log>>,
+    settings_json: &str,
+    progress: Option<Bound<'_, PyAny>>,
+    threads: usize,
+) -> PyResult<(String, String)> {
+    let settings = settings(py, settings_json)?;
+    let own = robot.robot.clone();
+    let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
+    work::run(py, progress, threads, move |tell| {
+        let logs = logs.iter().map(|log| log.of(&own.axes, false)).collect::<Result<Vec<_>, _>>()?;
+        let found = compare_logs(own, logs, &settings, &mut |done, of, what| {
+            tell(format!("{done} of {of} fits: {what}"));
+        })?;
+        Ok((found.to_json(), found.report()?))
+    })
+}
+
+/// Finds drive gains from logs with and without a known payload: the record as JSON.
+#[pyfunction]
+#[pyo3(signature = (robot, logs, settings_json, *, progress=None, threads=0))]
+pub(crate) fn gains(
+    py: Python<'_>,
+    robot: &Robot,
+    logs: Vec<PyRef<'_, Log>>,
+    settings_json: &str,
+    progress: Option<Bound<'_, PyAny>>,
+    threads: usize,
+) -> PyResult<String> {
+    let settings = settings(py, settings_json)?;
+    let own = robot.robot.clone();
+    let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
+    let file = work::run(py, progress, threads, move |tell| {
+        let logs = logs.iter().map(|log| log.of(&own.axes, false)).collect::<Result<Vec<_>, _>>()?;
+        Ok(gains_of_logs(own, logs, &settings, &mut |step| tell(step.to_string()))?.file())
+    })?;
+    as_json(&file)
 }
 
 /// The record as JSON, the page, and files by name and text.

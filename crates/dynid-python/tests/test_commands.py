@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import dynid
@@ -19,6 +23,65 @@ def test_preflight(indy7: dynid.Robot, made: dynid.Simulation) -> None:
     assert any("sign" in name for name in turned["id"]), turned
     twice = dynid.check(indy7, [made.log, made.log])
     assert "repeated_log" in twice["id"]
+
+
+def test_estimators_are_compared_as_the_command_line_does(tmp_path: Path) -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=20, rate_hz=100, seed=4)
+    steps: list[str] = []
+    found = dynid.compare(arm, made.log, progress=steps.append)
+    assert any("of" in step and "wls" in step for step in steps), steps
+    rows = found.estimators.rows()
+    assert found.best == rows[0]["name"] and rows[0]["rank"] == 1 and rows[0]["error"] < 5
+    assert {"textbook", "ols", "wls", "consistent"} <= {row["name"] for row in rows}
+    assert set(found.joints["joint"]) == set(arm.joints) and min(found.joints["rms"]) > 0
+    assert "<html" in found.report().lower() and str(found.best) in repr(found)
+    again = dynid.compare(arm, made.log, threads=1)
+    same = [{k: v for k, v in row.items() if k != "seconds"} for row in rows]
+    assert [{k: v for k, v in row.items() if k != "seconds"} for row in again.estimators.rows()] == same
+
+    (tmp_path / "arm.toml").write_text(dynid.examples.TWO_LINKS)
+    columns = np.column_stack([made.t, made.q, made.tau])
+    header = ",".join(["t", *(f"{s}_{j}" for s in ("q", "tau") for j in arm.joints)])
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header=header, comments="", fmt="%.17g")
+    program = [sys.executable, "-c", "from dynid._command_line import main; raise SystemExit(main())", "compare", "arm.toml"]
+    ended = subprocess.run([*program, "--log", "log.csv", "--json", "--quiet"], cwd=tmp_path, capture_output=True, check=False)
+    told = json.loads(ended.stdout)["estimators"]
+    assert [{k: row[k] for k in same[0]} for row in told] == same, ended.stderr
+
+    with pytest.raises(dynid.SettingError, match="belongs to the robot|gravity"):
+        dynid.compare(arm, made.log, gravity=[0, 0, 0])
+    with pytest.raises(dynid.DynidError, match="at least one log"):
+        dynid.compare(arm, [])
+
+
+def test_drive_gains_by_a_known_payload() -> None:
+    bare = dynid.examples.TWO_LINKS
+    stated = "mass = 2\ncom = [0, 0.01, 0.15]\ninertia_com = [0.02, 0, 0, 0.02, 0, 0.004]"
+    assert stated in bare
+    # 1.5 kg at 0.3 m on the axis of the forearm.
+    com = "[0, 0.005714285714285714, 0.21428571428571427]"
+    about = "[0.039371428571428574, 0, 0, 0.039285714285714285, 0.0012857142857142856, 0.004085714285714286]"
+    heavy = bare.replace(stated, f"mass = 3.5\ncom = {com}\ninertia_com = {about}")
+    gains = np.array([8.0, 5.0])
+    logs = []
+    for seed, text in enumerate((bare, heavy)):
+        made = dynid.simulate(dynid.Robot.parse(text, "arm.toml"), duration_s=40, rate_hz=250, seed=seed + 1)
+        carries: dict[str, Any] = {"payload": "tool"} if seed else {}
+        logs.append(dynid.Log(made.t, made.q, made.tau / gains, name=f"log{seed}", **carries))
+    arm = dynid.Robot.parse(bare, "arm.toml")
+    tool = {"name": "tool", "mass": 1.5, "com": [0, 0, 0.3]}
+    found = dynid.gains(arm, logs, payload=[tool])
+    assert found.status == "ok" and found.joints["joint"] == arm.joints
+    for row, true in zip(found.joints.rows(), gains, strict=True):
+        assert row["verdict"] == "determined" and abs(row["gain"] - true) < 4 * row["std"] and row["std"] < 0.1 * true, row
+        assert row["low"] < row["gain"] < row["high"] and row["unit"] == "N m/A"
+    with pytest.raises(dynid.SettingError, match="payload"):
+        dynid.gains(arm, logs)
+    with pytest.raises(dynid.SettingError, match="without it"):
+        dynid.gains(arm, logs[1], payload=[tool])
+    with pytest.raises(dynid.SettingError, match="`other`"):
+        dynid.gains(arm, logs, payload=[{**tool, "name": "other"}])
 
 
 def test_a_design_is_followed_and_tells_what_it_said() -> None:

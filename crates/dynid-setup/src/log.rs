@@ -163,10 +163,10 @@ impl Log {
         }
     }
 
-    /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; empty without.
+    /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; 1 for arrays.
     pub fn effort_factors(&self) -> Vec<f64> {
-        let effort = self.source.mapping.iter().filter_map(|mapping| mapping.effort.as_ref());
-        effort.flatten().flatten().map(|c| c.factor).collect()
+        let Some(mapping) = &self.source.mapping else { return vec![1.0; self.log.joints().len()] };
+        mapping.effort.iter().flatten().flatten().map(|c| c.factor).collect()
     }
 
     /// Doubts about the signals and what was done to them, in words.

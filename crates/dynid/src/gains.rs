@@ -22,6 +22,7 @@ use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
 use crate::pipeline::{Step, TrainingLog, held_where_not_logged, plan_elements};
 use crate::robot::{Robot, refuse_internal_load};
+use crate::settings::{LogSettings, Settings, labels};
 use crate::trust::interval_quantile;
 
 /// Drive gains, with the fit that they come from.
@@ -53,32 +54,48 @@ pub struct GainIdentification {
 pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
     config.demand_inputs()?;
-    let payload = known_payload(&config.payload, &config.log)?;
+    let asked = config.settings()?;
+    // What is wrong with settings is said before logs are read.
+    let logs: Vec<LogSettings> = config.log.iter().map(LogConfig::settings).collect();
+    known_payload(&asked, &logs.iter().collect::<Vec<_>>())?;
     if config.motor_side.is_some() {
         let why = "drive gains behind a transmission matrix: give currents and positions of the joints";
         return Err(Error::Unsupported(why.to_owned()));
     }
-    if config.conditioning.route == Route::Textbook {
-        return Err(Error::Unsupported("drive gains by the textbook route: leave `route` out".to_owned()));
-    }
-    let own = config.log.iter().flat_map(|log| &log.own);
-    if let Some(own) = own.into_iter().find(|own| matches!(own, Own::FrictionScale | Own::Delay)) {
-        let why = format!("drive gains beside `own = [\"{}\"]`: take `offset` and `friction`", own.word());
-        return Err(Error::Unsupported(why));
-    }
     progress(Step::Read(config.robot.display().to_string()));
     let robot = config.read_robot()?;
+    let loaded = config.read_training(&robot, progress)?;
+    let found = gains_of_logs(robot, loaded, &asked, progress)?;
+    let provenance = config.provenance(found.provenance.inputs);
+    Ok(GainIdentification { provenance, ..found })
+}
+
+/// Finds the drive gains from logs with and without a payload of known mass, as [`identify_gains`] does; the logs need not come from files.
+///
+/// # Errors
+/// As [`identify_gains`]; [`Error::Setting`] too for no log, and for a log that names what there is not.
+pub fn gains_of_logs(
+    robot: Robot,
+    mut loaded: Vec<Log>,
+    asked: &Settings,
+    progress: &mut dyn FnMut(Step),
+) -> Result<GainIdentification, Error> {
+    if loaded.is_empty() {
+        return Err(Error::setting("log", "at least one log to identify from", "none"));
+    }
+    let of_logs: Vec<&LogSettings> = loaded.iter().map(|log| &log.settings).collect();
+    let labels = labels(loaded.iter().map(|log| (&log.settings, log.log.name())));
+    let payload = known_payload(asked, &of_logs)?;
+    asked.check_logs(&of_logs, &[], &labels)?;
     refuse_internal_load(&robot, "identified")?;
-    let mut loaded = config.read_training(&robot, progress)?;
     let robot = held_where_not_logged(robot, &loaded)?;
-    let asked = config.settings()?;
     let settings = asked.conditioning_settings();
-    let training: Vec<TrainingLog> = (loaded.iter().zip(config.log_labels()))
+    let training: Vec<TrainingLog> = (loaded.iter().zip(labels))
         .map(|(log, label)| TrainingLog { label, settings: log.settings.clone(), reference: None })
         .collect();
     let scale = common_scale(&loaded)?;
-    let mut plan = plan_elements(&asked, &robot, &loaded)?;
-    let terms = LogTerms::of(&asked, &training, &robot)?;
+    let mut plan = plan_elements(asked, &robot, &loaded)?;
+    let terms = LogTerms::of(asked, &training, &robot)?;
     for (log, TrainingLog { label, settings, .. }) in loaded.iter_mut().zip(&training) {
         log.log = terms.with_gates(log.log.clone(), Some(label), settings.payload.as_deref());
     }
@@ -89,17 +106,17 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     progress(Step::Structure);
     let shape = model.parameters().shape_start();
     let apart = PerOutput::new(&model);
-    let base_settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
+    let base_settings = BaseSettings { seed: asked.seed.unwrap_or(1), ..BaseSettings::default() };
     let base = BaseParameters::of_model(&apart, &shape, &base_settings);
     let choices = condition(&apart, &shape, &base.kept, &prepared, &settings, &mut |stage| {
         progress(Step::Conditioning(stage));
     })?;
     progress(Step::Fit);
     let source = LogRows::new(&apart, &shape, &base.kept, &prepared, &choices, &settings)?;
-    let (fit, _) = fitting::fit(&asked, base.len(), &LinearMethod::Wls, &source)?;
+    let (fit, _) = fitting::fit(asked, base.len(), &LinearMethod::Wls, &source)?;
     let residuals = fitting::residuals(&source, &fit)?;
     drop(source);
-    let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
+    let fitted = fitting::with_precision(fit, &residuals, &prepared, asked.conditioning.block_s.is_some());
     let evidence = Evidence { apart: &apart, base: &base, fitted: &fitted, payload };
     let joints = (0..apart.outputs().len()).map(|output| evidence.gain(output, scale[output])).collect();
     let mut warnings = robot.warnings.clone();
@@ -116,13 +133,19 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
         payload: payload.clone(),
         warnings,
         robot: name,
-        provenance: config.provenance(inputs),
+        provenance: Provenance {
+            inputs,
+            settings: serde_json::to_value(asked).unwrap_or_else(|e| unreachable!("plain data: {e}")),
+            seed: asked.seed.unwrap_or(1),
+            ..Provenance::default()
+        },
     })
 }
 
-fn known_payload<'a>(stated: &'a [PayloadConfig], logs: &[LogConfig]) -> Result<&'a PayloadConfig, Error> {
-    let [payload] = stated else {
-        return Err(Error::setting("payload", "one `[[payload]]`", stated.len()));
+/// The payload that gains are told by; refuses settings that gains cannot go with.
+fn known_payload<'a>(asked: &'a Settings, logs: &[&LogSettings]) -> Result<&'a PayloadConfig, Error> {
+    let [payload] = &asked.payload[..] else {
+        return Err(Error::setting("payload", "one `[[payload]]`", asked.payload.len()));
     };
     let key = |key: &str| format!("payload.{}{key}", payload.name);
     if payload.mass.is_none() {
@@ -131,6 +154,14 @@ fn known_payload<'a>(stated: &'a [PayloadConfig], logs: &[LogConfig]) -> Result<
     if logs.iter().all(|log| log.payload.is_some()) {
         let expected = "a `[[log]]` without it beside those that carry it";
         return Err(Error::setting(&key(""), expected, "it in every log"));
+    }
+    if asked.conditioning.route == Route::Textbook {
+        return Err(Error::Unsupported("drive gains by the textbook route: leave `route` out".to_owned()));
+    }
+    let own = logs.iter().flat_map(|log| &log.own);
+    if let Some(own) = own.into_iter().find(|own| matches!(own, Own::FrictionScale | Own::Delay)) {
+        let why = format!("drive gains beside `own = [\"{}\"]`: take `offset` and `friction`", own.word());
+        return Err(Error::Unsupported(why));
     }
     Ok(payload)
 }

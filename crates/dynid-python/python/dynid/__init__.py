@@ -14,7 +14,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 """
 
 from . import examples
-from ._commands import Design, Online, check, design
+from ._commands import Comparison, Design, Gains, Online, check, compare, design, gains
 from ._estimate import Estimate, Factor, identify, identify_file
 from ._fleet import FactorStore, Fleet, ManifestRow, fleet, read_manifest, reduce_log
 from ._log import Log, Simulation, find_logs, read_columns, simulate
@@ -34,6 +34,7 @@ from ._table import Table
 
 __all__ = [
     "CommandLog",
+    "Comparison",
     "Design",
     "DynidError",
     "DynidWarning",
@@ -42,6 +43,7 @@ __all__ = [
     "Factor",
     "FactorStore",
     "Fleet",
+    "Gains",
     "Log",
     "LogError",
     "ManifestRow",
@@ -55,10 +57,12 @@ __all__ = [
     "UnsupportedError",
     "__version__",
     "check",
+    "compare",
     "design",
     "examples",
     "find_logs",
     "fleet",
+    "gains",
     "identify",
     "identify_file",
     "read_columns",

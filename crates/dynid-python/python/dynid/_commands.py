@@ -1,4 +1,4 @@
-"""Before and beside identification: pre-flight, designs, robots that run."""
+"""Before and beside identification: pre-flight, comparisons, drive gains, designs, robots that run."""
 
 from __future__ import annotations
 
@@ -29,6 +29,99 @@ def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> T
     """
     rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), as_json(settings)))
     return Table.of_rows(rows, ("severity", "id", "log", "joint", "evidence", "remedy"))
+
+
+class Comparison:
+    """Every estimator that applies, by its error on time that it did not see.
+
+    `record`: the keys of `dynid compare --json`.
+    """
+
+    def __init__(self, text: str, page: str) -> None:
+        self.record: dict[str, Any] = json.loads(text)
+        self._report = page
+
+    @property
+    def estimators(self) -> Table:
+        """A row per estimator, best first, failed ones last.
+
+        Columns: `name`, `what`, `rank`, `error` (held-out error relative to the effort, mean over joints, %), `standard_error`,
+        `level_with_best` (behind by less than two standard errors), `seconds` (of a fit), `failure`.
+        """
+        names = ("name", "what", "rank", "error", "standard_error", "level_with_best", "seconds", "failure")
+        return Table.of_rows(self.record["estimators"], names)
+
+    @property
+    def joints(self) -> Table:
+        """A row per estimator that was fitted and joint that moves: `estimator`, `joint`, `rms` (N m or N), `relative` (%)."""
+        rows = [
+            {"estimator": one["name"], "joint": joint, **errors}
+            for one in self.record["estimators"]
+            for joint, errors in zip(self.record["joints"], one["joints"], strict=False)
+            if errors is not None
+        ]
+        return Table.of_rows(rows, ("estimator", "joint", "rms", "relative"))
+
+    @property
+    def best(self) -> str | None:
+        """Name of the best estimator; None if none could be fitted."""
+        first = self.record["estimators"][0]
+        return None if first["rank"] is None else str(first["name"])
+
+    def report(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The report as one HTML page, written to `path` if that is given."""
+        return written(path, self._report)
+
+    def __repr__(self) -> str:
+        return f"<dynid.Comparison>\n{self.estimators!r}"
+
+
+def compare(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
+    """Compares estimators on the same logs: each is fitted to all folds of time but one, and predicts that one.
+
+    `settings` as for `identify`; kernel, masks and delay are chosen once for all estimators. One that fails is in the table, with the reason.
+    """
+    text, page = _native.compare(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads)
+    return Comparison(text, page)
+
+
+class Gains:
+    """Gains of drives, effort per unit of what was logged, by a payload of known mass.
+
+    `record`: the keys of `dynid gains --json`.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.record: dict[str, Any] = json.loads(text)
+
+    @property
+    def status(self) -> str:
+        """`ok` if the gain of a drive at least is determined, else `fail`."""
+        return str(self.record["status"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to mind."""
+        return list(self.record["warnings"])
+
+    @property
+    def joints(self) -> Table:
+        """A row per drive: `joint`, `gain` (None unless it is determined), `std`, `low` and `high` (95 %), `unit`, `t` (of the load's effort),
+        `share` (of the load's effort that nothing else explains), `verdict`."""
+        rows = [{**row, **dict(zip(("low", "high"), row["interval"] or (), strict=False))} for row in self.record["joints"]]
+        return Table.of_rows(rows, ("joint", "gain", "std", "low", "high", "unit", "t", "share", "verdict"))
+
+    def __repr__(self) -> str:
+        return f"<dynid.Gains by {self.record['payload']} of {self.record['mass']} kg>\n{self.joints!r}"
+
+
+def gains(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Gains:
+    """Finds what a unit of logged effort (a current in A, say) is in N m or N, from logs with and without a payload of known mass.
+
+    `logs`: `Log(..., payload="tool")` for those that carry it. `settings`: `payload=[{"name": "tool", "mass": 2.0, "com": [0, 0, 0.1]}]`, and
+    those of `identify`. A drive on which the load does not act is an outcome (`verdict`), not an error.
+    """
+    return Gains(_native.gains(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads))
 
 
 class Design:

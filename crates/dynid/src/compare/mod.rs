@@ -19,7 +19,10 @@ use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
-use crate::pipeline::{ModelFit, Problem, Step};
+use crate::log::Log;
+use crate::pipeline::{self, ModelFit, Problem, Step};
+use crate::robot::Robot;
+use crate::settings::Settings;
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
 
@@ -50,17 +53,36 @@ pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) ->
         },
         ..config.clone()
     };
-    let mut opened = compact.open(&mut |_: Step| {})?;
+    compact.check()?;
+    compact.demand_inputs()?;
+    let robot = compact.read_robot()?;
+    let logs = compact.read_all(&robot, &mut |_: Step| {})?;
+    compare_logs(robot, logs, &config.settings()?, progress)
+}
+
+/// Compares all estimators that settings allow on logs, which need not come from files. `progress`: fits done, of how many, and what is
+/// being fitted.
+///
+/// # Errors
+/// Fails as [`pipeline::open`] does. An estimator that fails is in the table with its reason, and no error.
+pub fn compare_logs(
+    robot: Robot,
+    logs: Vec<Log>,
+    asked: &Settings,
+    progress: &mut dyn FnMut(usize, usize, &str),
+) -> Result<Comparison, Error> {
+    let mut compact = asked.clone();
+    compact.conditioning.route = Route::Compact;
+    let mut opened = pipeline::open(robot, logs, &compact, &mut |_| {})?;
     progress(0, 1, "conditioning");
     let conditioning = opened.problem.condition(&mut |_| {})?;
     let conditioning = conditioning.unwrap_or_else(|| unreachable!("the route is the compact one"));
-    let asked = config.settings()?;
     let bench = Bench {
         problem: &opened.problem,
         conditioning: &conditioning,
         settings: asked.conditioning_settings(),
     };
-    let list = contestants(&asked, &opened.problem);
+    let list = contestants(asked, &opened.problem);
     let folds: Vec<[Arc<[PreparedLog]>; 2]> = (0..FOLDS).map(|k| split(&opened.problem.logs, k)).collect();
     let total = list.len() * FOLDS;
     let scores = list
