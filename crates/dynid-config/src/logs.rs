@@ -87,6 +87,7 @@ struct Read {
     /// Those that the columns state.
     channels: Vec<String>,
     by_number: bool,
+    on_motors: bool,
 }
 
 fn read(
@@ -126,7 +127,8 @@ fn of_signals(
     }
     state_temperatures(&mut signals, config, &joints)?;
     let channels = spec.channels.keys().cloned().collect();
-    Ok(Read { signals, mapping, source, unwrapped, notes, channels, by_number: by_number(spec) })
+    let (by_number, on_motors) = (by_number(spec), motor_side.is_some());
+    Ok(Read { signals, mapping, source, unwrapped, notes, channels, by_number, on_motors })
 }
 
 /// Whether joints are told by the numbers of columns alone.
@@ -160,7 +162,7 @@ fn state_temperatures(signals: &mut Signals, config: &LogConfig, joints: &[Strin
 }
 
 fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Result<Log, Error> {
-    let Read { mut signals, mapping, source, mut unwrapped, notes, channels, by_number } = read;
+    let Read { mut signals, mapping, source, mut unwrapped, notes, channels, by_number, on_motors } = read;
     // Many turns look like degrees: units were judged before.
     unwrapped.extend(turns::unwrap(&mut signals, axes));
     let joints: Vec<String> = mapping.joints.clone();
@@ -191,6 +193,7 @@ fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Resul
         columns,
         mapping: Some(mapping),
         by_number,
+        on_motors,
         rows,
         inputs,
         notes,

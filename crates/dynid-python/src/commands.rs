@@ -11,12 +11,13 @@ use dynid::overlap::Overlaps;
 use dynid::pipeline::held_where_not_logged;
 use dynid::preflight;
 use dynid::servo::{ServoConfig, ServoStep, identify_servo};
+use dynid::settings::Method;
 use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Batch, demand_finite, vector};
-use crate::error::raise;
+use crate::error::{raise, setting};
 use crate::log::Log;
 use crate::robot::Robot;
 use crate::settings::{as_json, parsed, settings};
@@ -75,7 +76,17 @@ pub(crate) fn gains(
     progress: Option<Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<String> {
+    let keys: serde_json::Map<String, serde_json::Value> = parsed(py, settings_json, "settings")?;
+    let idle = ["bound", "instruments", "known_effort_scale", "known_mass", "preferred", "preflight"];
+    if let Some(key) = idle.into_iter().find(|key| keys.contains_key(*key)) {
+        return Err(setting(py, format!("setting `{key}`: does nothing for drive gains"), "leave it out"));
+    }
     let settings = settings(py, settings_json)?;
+    if settings.estimator.method != Method::Wls {
+        let what =
+            "setting `estimator.method`: expected `wls`, which gains of drives are found by".to_owned();
+        return Err(setting(py, what, "leave it out"));
+    }
     let own = robot.robot.clone();
     let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
     let file = work::run(py, progress, threads, move |tell| {

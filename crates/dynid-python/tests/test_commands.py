@@ -55,7 +55,7 @@ def test_estimators_are_compared_as_the_command_line_does(tmp_path: Path) -> Non
         dynid.compare(arm, [])
 
 
-def test_drive_gains_by_a_known_payload() -> None:
+def test_drive_gains_by_a_known_payload(tmp_path: Path) -> None:
     bare = dynid.examples.TWO_LINKS
     stated = "mass = 2\ncom = [0, 0.01, 0.15]\ninertia_com = [0.02, 0, 0, 0.02, 0, 0.004]"
     assert stated in bare
@@ -82,6 +82,19 @@ def test_drive_gains_by_a_known_payload() -> None:
         dynid.gains(arm, logs[1], payload=[tool])
     with pytest.raises(dynid.SettingError, match="`other`"):
         dynid.gains(arm, logs, payload=[{**tool, "name": "other"}])
+    with pytest.raises(dynid.SettingError, match="`bound`: does nothing"):
+        dynid.gains(arm, logs, payload=[tool], bound=[{"parameter": "elbow.fc", "range": [0, 1]}])
+    with pytest.raises(dynid.SettingError, match="expected `wls`"):
+        dynid.gains(arm, logs, payload=[tool], estimator={"method": "huber"})
+    with pytest.raises(dynid.DynidError, match="at least one log"):
+        dynid.gains(arm, [], payload=[tool])
+    # Currents of motors that joints share have no gain per joint.
+    columns = np.column_stack([made.t, made.q, made.tau])
+    header = ",".join(["t", *(f"{s}_{j}" for s in ("q", "tau") for j in arm.joints)])
+    np.savetxt(tmp_path / "motors.csv", columns, delimiter=",", header=header, comments="")
+    motors = dynid.Log.read(tmp_path / "motors.csv", motor_side={"matrix": [[1, 0], [1, 1]]})
+    with pytest.raises(dynid.UnsupportedError, match="transmission matrix"):
+        dynid.gains(arm, [motors, logs[1]], payload=[tool])
 
 
 def test_a_design_is_followed_and_tells_what_it_said() -> None:

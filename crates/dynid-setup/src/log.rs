@@ -48,6 +48,8 @@ pub struct LogSource {
     pub mapping: Option<ColumnMapping>,
     /// Whether joints were told by the numbers of columns alone, which another order would not show.
     pub by_number: bool,
+    /// Whether positions and efforts were those of motors before a transmission matrix took them to the joints.
+    pub on_motors: bool,
     /// Per row of the log: its data row in the file, from 1; empty: rows as they are.
     pub rows: Vec<usize>,
     /// Channels that the columns state, each of which wants a reader.

@@ -59,8 +59,7 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     let logs: Vec<LogSettings> = config.log.iter().map(LogConfig::settings).collect();
     known_payload(&asked, &logs.iter().collect::<Vec<_>>())?;
     if config.motor_side.is_some() {
-        let why = "drive gains behind a transmission matrix: give currents and positions of the joints";
-        return Err(Error::Unsupported(why.to_owned()));
+        return Err(behind_a_matrix());
     }
     progress(Step::Read(config.robot.display().to_string()));
     let robot = config.read_robot()?;
@@ -86,6 +85,9 @@ pub fn gains_of_logs(
     let of_logs: Vec<&LogSettings> = loaded.iter().map(|log| &log.settings).collect();
     let labels = labels(loaded.iter().map(|log| (&log.settings, log.log.name())));
     let payload = known_payload(asked, &of_logs)?;
+    if loaded.iter().any(|log| log.source.on_motors) {
+        return Err(behind_a_matrix());
+    }
     asked.check_logs(&of_logs, &[], &labels)?;
     refuse_internal_load(&robot, "identified")?;
     let robot = held_where_not_logged(robot, &loaded)?;
@@ -140,6 +142,13 @@ pub fn gains_of_logs(
             ..Provenance::default()
         },
     })
+}
+
+/// Columns of motors that joints share have no gain per joint.
+fn behind_a_matrix() -> Error {
+    Error::Unsupported(
+        "drive gains behind a transmission matrix: give currents and positions of the joints".to_owned(),
+    )
 }
 
 /// The payload that gains are told by; refuses settings that gains cannot go with.

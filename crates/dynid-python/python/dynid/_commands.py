@@ -79,7 +79,7 @@ class Comparison:
 def compare(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
     """Compares estimators on the same logs: each is fitted to all folds of time but one, and predicts that one.
 
-    `settings` as for `identify`; kernel, masks and delay are chosen once for all estimators. One that fails is in the table, with the reason.
+    `settings` as for `identify`, but that every estimator takes its own method; kernel, masks and delay are chosen once for all estimators. One that fails is in the table, with the reason.
     """
     text, page = _native.compare(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads)
     return Comparison(text, page)
@@ -119,7 +119,7 @@ def gains(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress
     """Finds what a unit of logged effort (a current in A, say) is in N m or N, from logs with and without a payload of known mass.
 
     `logs`: `Log(..., payload="tool")` for those that carry it. `settings`: `payload=[{"name": "tool", "mass": 2.0, "com": [0, 0, 0.1]}]`, and
-    those of `identify`. A drive on which the load does not act is an outcome (`verdict`), not an error.
+    those of `identify` that gains depend on; others are refused. No pre-flight is made (`check` makes it). A drive on which the load does not act is an outcome (`verdict`), not an error.
     """
     return Gains(_native.gains(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads))
 
