@@ -4,9 +4,11 @@ use std::fmt::Write;
 use std::path::Path;
 
 use dynid_export::Source;
+use dynid_files::FileMember;
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
 use dynid_robots::mjcf::{self, JointParameters};
+use dynid_robots::robot;
 use dynid_robots::urdf::{self, JointDynamics};
 use dynid_servo::identify::EffortUse;
 use dynid_servo::{Channel, ServoJoint, Term};
@@ -25,20 +27,18 @@ pub struct ServoFiles {
 
 /// Friction and rotors that the robot file states.
 pub fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
-    let text = || dynid_files::input::read_text(&robot.path);
-    let read = |source| Error::Read { file: robot.path.clone(), source };
+    let Some(text) = &robot.file.xml else { return Ok(Vec::new()) };
     if robot.file.mjcf.is_some() {
-        return Ok(mjcf::parse(&text().map_err(read)?, &robot.path)?.joints);
+        return Ok(mjcf::parse(text, FileMember::of(&robot.path).path)?.joints);
     }
     let Some(file) = &robot.file.urdf else { return Ok(Vec::new()) };
-    let text = dynid_files::input::read_text(Path::new(file)).map_err(read)?;
     let of = |d: JointDynamics| JointParameters {
         joint: d.joint,
         damping: d.damping,
         friction_loss: d.friction,
         armature: 0.0,
     };
-    Ok(urdf::dynamics(&text, file)?.into_iter().map(of).collect())
+    Ok(urdf::dynamics(text, file)?.into_iter().map(of).collect())
 }
 
 impl ServoFiles {
@@ -46,15 +46,12 @@ impl ServoFiles {
     ///
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Read`].
-    pub fn names(robot: &Path) -> Result<Vec<String>, Error> {
-        let source = Source::read(robot)?;
-        let name = |part: Option<&std::ffi::OsStr>| {
-            part.map_or_else(String::new, |n| n.to_string_lossy().into_owned())
-        };
-        let (file, stem) = (name(robot.file_name()), name(robot.file_stem()));
+    pub fn names(path: &Path) -> Result<Vec<String>, Error> {
+        let source = Source::read(path)?;
+        let stem = robot::stem(path);
         let mut out = Vec::new();
         if source.is_mjcf() {
-            out.push(file);
+            out.push(format!("{stem}.xml"));
             out.extend(source.included().into_iter().map(str::to_owned));
         } else {
             if source.urdf_text().is_some() {
@@ -72,7 +69,7 @@ impl ServoResult {
     ///
     /// | file | what |
     /// |---|---|
-    /// | the robot file's name | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, else byte for byte |
+    /// | `NAME.urdf`, `NAME.xml` (MJCF) | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, else byte for byte |
     /// | `NAME.mujoco.xml` | for robots that are no MJCF: the robot in MJCF with its actuators |
     /// | `actuators.xml` | MJCF `<actuator>`: one affine actuator per joint, for `<include>` |
     /// | `actuators.json` | stiffness, damping, armature, friction, limits, delay, zero and direction by joint, for simulators of many robots |
@@ -95,11 +92,11 @@ impl ServoResult {
             .collect();
         let mut files = Vec::new();
         let name = self.robot.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let stem = self.robot.path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let stem = robot::stem(&self.robot.path);
         let actuators = self.actuators_xml(&names);
         if let Some(text) = source.mjcf_text() {
-            let mut edited = mjcf::edit(text, &self.robot.path, &[], &joints)?;
-            files.push((name.clone(), edited.remove(0).text));
+            let mut edited = mjcf::edit(text, &FileMember::of(&self.robot.path).path, &[], &joints)?;
+            files.push((format!("{stem}.xml"), edited.remove(0).text));
             let folder = self.robot.path.parent().unwrap_or(Path::new(""));
             for included in source.included() {
                 let text = match edited.iter().find(|f| f.name == included) {

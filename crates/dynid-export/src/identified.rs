@@ -74,10 +74,6 @@ impl IdentifiedRobot {
 pub struct Source {
     pub(crate) path: PathBuf,
     pub(crate) file: RobotFile,
-    /// Text of the URDF that holds the tree, if one does.
-    pub(crate) urdf: Option<String>,
-    /// Text of the MJCF, if the file is one.
-    pub(crate) mjcf: Option<String>,
 }
 
 impl Source {
@@ -86,7 +82,7 @@ impl Source {
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        Self::of(dynid_robots::robot::read(path)?, path, text_of)
+        Ok(Self::of(dynid_robots::robot::read(path)?, path))
     }
 
     /// A robot file from its text; `path` stands in messages, and places files that the text refers to.
@@ -94,28 +90,26 @@ impl Source {
     /// # Errors
     /// As [`Source::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let own = |name: &Path| if name == path { Ok(text.to_owned()) } else { text_of(name) };
-        Self::of(dynid_robots::robot::parse(text, path)?, path, own)
+        Ok(Self::of(dynid_robots::robot::parse(text, path)?, path))
     }
 
-    fn of(
-        file: RobotFile,
-        path: &Path,
-        text: impl Fn(&Path) -> Result<String, Error>,
-    ) -> Result<Self, Error> {
-        let urdf = file.urdf.as_ref().map(|urdf| text(urdf.as_ref())).transpose()?;
-        let mjcf = file.mjcf.as_ref().map(|_| text(path)).transpose()?;
-        Ok(Source { path: path.to_owned(), file, urdf, mjcf })
+    fn of(file: RobotFile, path: &Path) -> Self {
+        Source { path: path.to_owned(), file }
     }
 
     /// Text of the MJCF, if the robot is one.
     pub fn mjcf_text(&self) -> Option<&str> {
-        self.mjcf.as_deref()
+        self.file.xml.as_deref().filter(|_| self.is_mjcf())
     }
 
     /// Text of the URDF that holds the tree, if one does.
     pub fn urdf_text(&self) -> Option<&str> {
-        self.urdf.as_deref()
+        self.file.xml.as_deref().filter(|_| self.file.urdf.is_some())
+    }
+
+    /// SHA-256 of the file, hexadecimal; `None` of a text.
+    pub fn sha256(&self) -> Option<&str> {
+        self.file.sources.first().map(|file| file.sha256.as_str())
     }
 
     /// The robot as the file has it.
@@ -125,7 +119,7 @@ impl Source {
 
     /// Whether the robot is an MJCF, into which identified parameters are put in place.
     pub fn is_mjcf(&self) -> bool {
-        self.mjcf.is_some()
+        self.file.mjcf.is_some()
     }
 
     /// Files of its folder that an MJCF includes, by their paths from there: they may change with it.
@@ -142,10 +136,6 @@ impl Source {
         let mut massless = self.file.elements.ties.iter().flat_map(|tie| &tie.massless);
         self.is_mjcf() && massless.any(|name| name == link)
     }
-}
-
-fn text_of(path: &Path) -> Result<String, Error> {
-    dynid_files::input::read_text(path).map_err(|source| Error::Read { file: path.into(), source })
 }
 
 impl<'a> Identified<'a> {

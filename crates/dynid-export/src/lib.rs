@@ -195,8 +195,8 @@ impl<'a> RobotExport<'a> {
     /// [`Error::RobotFile`]: URDF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn urdf(&self, states: &CheckStates) -> Result<Exported, Error> {
         let JointValues { joints, notes } = self.joint_values(Format::Urdf, states);
-        let source = match &self.source.urdf {
-            Some(text) => text.clone(),
+        let source = match self.source.urdf_text() {
+            Some(text) => text.to_owned(),
             None => urdf::from_description(&self.description)?,
         };
         let name = self.source.path.display().to_string();
@@ -270,7 +270,7 @@ impl<'a> RobotExport<'a> {
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
         let JointValues { joints, mut notes } = self.joint_values(Format::Mjcf, states);
-        if let Some(text) = &self.source.mjcf {
+        if let Some(text) = self.source.mjcf_text() {
             return self.mjcf_in_place(text, &joints, notes, states);
         }
         let text = match self.identified.model.closed() {

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use dynid::config::Config;
 use dynid::estimate::{Estimate as Record, Split, log_fit};
 use dynid::export::{CheckStates, IdentifiedRobot, RobotExport, Source, exported, json};
-use dynid::logs::sha256;
 use dynid::model::{EffortModel, RobotModel};
 use dynid::pipeline::Identification;
 use dynid::validate::validate_logs;
@@ -86,7 +85,7 @@ impl Estimate {
         };
         let path = Path::new(&file.path);
         let source = Source::read(path)?;
-        let changed = sha256(path)? != file.sha256;
+        let changed = source.sha256() != Some(file.sha256.as_str());
         Ok((source, changed.then(|| format!("{} has changed since it was identified", file.path))))
     }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use dynid::estimators::{Factor as Triangle, FactorBuilder, FactorError};
+use dynid::io::robot::stem;
 use dynid::model::dynamics::{AddedInertia, Dynamics, LoadedState};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, RegressorBlock, RobotModel};
 use dynid::{RobotOptions, inspect};
@@ -139,21 +140,23 @@ impl Robot {
 
 #[pymethods]
 impl Robot {
-    /// Reads a robot file: URDF, MJCF, or TOML with DH rows or bodies.
+    /// Reads a robot file: URDF, MJCF, SDF, each as xacro too, or TOML with DH rows or bodies.
     ///
-    /// `gravity`: m/s² in base axes, in place of the file's; `couple_mimics`: mimic joints follow their leaders; `floating_base`: a floating
+    /// `arguments`: those of a xacro file, by name; `gravity`: m/s² in base axes, in place of the file's; `couple_mimics`: mimic joints follow their leaders; `floating_base`: a floating
     /// joint under the root link; `locked`: joints held at a position (rad or m), by name. Raises `RobotError`.
     #[staticmethod]
-    #[pyo3(signature = (path, *, gravity=None, couple_mimics=false, floating_base=false, locked=None))]
+    #[pyo3(signature = (path, *, arguments=None, gravity=None, couple_mimics=false, floating_base=false, locked=None))]
     fn load(
         py: Python<'_>,
         path: PathBuf,
+        arguments: Option<BTreeMap<String, String>>,
         gravity: Option<[f64; 3]>,
         couple_mimics: bool,
         floating_base: bool,
         locked: Option<BTreeMap<String, f64>>,
     ) -> PyResult<Self> {
         let options = options(gravity, couple_mimics, floating_base, locked);
+        let path = with_arguments(path, arguments.as_ref());
         let robot = dynid::Robot::load(&path, &options).map_err(|e| raise(py, &e))?;
         Robot::of(py, robot, None, options)?.told(py)
     }
@@ -171,8 +174,14 @@ impl Robot {
         locked: Option<BTreeMap<String, f64>>,
     ) -> PyResult<Self> {
         let options = options(gravity, couple_mimics, floating_base, locked);
-        let robot = dynid::Robot::parse(text, Path::new(name), &options).map_err(|e| raise(py, &e))?;
-        Robot::of(py, robot, Some(text.into()), options)?.told(py)
+        let mut robot = dynid::Robot::parse(text, Path::new(name), &options).map_err(|e| raise(py, &e))?;
+        // What is kept must need no other file: of xacro what it expands to.
+        let kept = robot.file.xml.clone().filter(|_| text.trim_start().starts_with('<'));
+        if kept.as_deref().is_some_and(|kept| kept != text) {
+            let ending = if robot.file.mjcf.is_some() { "xml" } else { "urdf" };
+            robot.path = format!("{}.{ending}", stem(&robot.path)).into();
+        }
+        Robot::of(py, robot, Some(kept.unwrap_or_else(|| text.into())), options)?.told(py)
     }
 
     /// A robot that was pickled; its doubts were told before.
@@ -224,6 +233,12 @@ impl Robot {
     #[getter]
     fn text(&self) -> Option<&str> {
         self.text.as_deref()
+    }
+
+    /// The plain XML of a URDF or MJCF, xacro expanded; of a robot in TOML that of the URDF that it names. `None`: it has none.
+    #[getter]
+    fn xml(&self) -> Option<&str> {
+        self.robot.file.xml.as_deref()
     }
 
     /// Joints, then motors behind springs: the order of efforts. Of a mechanism with loops the drives.
@@ -561,6 +576,13 @@ impl Robot {
 }
 
 /// A robot that a function of the package describes in TOML.
+/// `FILE#name:=value,name:=value`.
+fn with_arguments(path: PathBuf, arguments: Option<&BTreeMap<String, String>>) -> PathBuf {
+    let Some(arguments) = arguments.filter(|arguments| !arguments.is_empty()) else { return path };
+    let stated: Vec<String> = arguments.iter().map(|(name, value)| format!("{name}:={value}")).collect();
+    format!("{}#{}", path.display(), stated.join(",")).into()
+}
+
 fn described(py: Python<'_>, function: &str, model: &Bound<'_, PyAny>) -> PyResult<Robot> {
     let (text, warnings): (String, Vec<String>) =
         py.import("dynid._models")?.getattr(function)?.call1((model,))?.extract()?;

@@ -1,4 +1,4 @@
-//! Robot files: URDF, MJCF, SDF, robots in TOML (DH tables or body trees), meshes (STL, OBJ).
+//! Robot files: URDF, MJCF, SDF, each as xacro too, robots in TOML (DH tables or body trees), meshes (STL, OBJ).
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
 //! typed error whose `Display` is one line (file, line, column, expected, found) and whose `hint()` says what
@@ -6,6 +6,7 @@
 
 pub mod mesh;
 pub mod mjcf;
+mod plain;
 pub mod robot;
 mod robot_error;
 mod robot_numbers;
@@ -14,6 +15,8 @@ mod source;
 mod tie;
 pub mod toml_robot;
 pub mod urdf;
+mod xacro;
+mod xacro_fault;
 
 pub use mesh::{Mesh, MeshError};
 pub use robot_error::{Place, RobotFileError};
@@ -22,3 +25,4 @@ pub use toml_robot::{
     ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
     ReactionLoad, ReactionSpec, RobotFile, SettingValue,
 };
+pub use xacro_fault::XacroFault;

@@ -5,6 +5,8 @@ use std::io;
 
 use thiserror::Error;
 
+use crate::xacro_fault::XacroFault;
+
 /// A place in a text file, printed `file:line:column`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -97,13 +99,21 @@ pub enum RobotFileError {
         /// Cap.
         limit: usize,
     },
-    /// Unexpanded xacro.
-    #[error("{at}: expected plain URDF, found xacro: `{found}`")]
-    Xacro {
+    /// A tag or an expression of xacro in what was not expanded.
+    #[error("{at}: expected plain XML, found xacro: `{found}`")]
+    Unexpanded {
         /// Where.
         at: Place,
         /// The tag or expression.
         found: String,
+    },
+    /// xacro that cannot be expanded.
+    #[error("{at}: {fault}")]
+    Xacro {
+        /// Where.
+        at: Box<Place>,
+        /// What is wrong.
+        fault: Box<XacroFault>,
     },
     /// The outermost element is none of `<robot>`, `<mujoco>` and `<sdf>`.
     #[error(
@@ -234,14 +244,10 @@ impl RobotFileError {
             }
             E::Syntax { .. } => "the file is damaged or cut off at or before this place".into(),
             E::TooMany { .. } => "this does not look like a robot".into(),
-            E::Xacro { at, .. } => {
-                let stem = at.file.strip_suffix(".xacro").map(|name| name.trim_end_matches(".urdf"));
-                let to = stem.map_or_else(|| format!("{}.expanded", at.file), str::to_owned);
-                format!(
-                    "expand it first: `xacro {} > {to}.urdf` (behind the file its arguments, `name:=value`)",
-                    at.file
-                )
+            E::Unexpanded { at, .. } => {
+                format!("call the file `{}.xacro`, so that it is expanded", at.file.trim_end_matches(".urdf"))
             }
+            E::Xacro { at, fault } => fault.hint(&at.file),
             E::NotARobot { .. } => {
                 "a URDF starts with <robot name=\"...\">, MJCF with <mujoco>, SDF with <sdf version=\"...\">"
                     .into()

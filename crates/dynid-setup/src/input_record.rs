@@ -10,6 +10,8 @@ dynid_record::words! {
         Robot = "robot",
         /// The URDF that a robot file refers to.
         Urdf = "urdf",
+        /// A file that the robot file includes.
+        Included = "included",
         /// A mesh of a link.
         Mesh = "mesh",
         /// A log that the result rests on.

@@ -6,6 +6,7 @@ mod elements;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use dynid_files::SourceFile;
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::ElementRegistry;
 use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel, Ties};
@@ -117,10 +118,19 @@ impl Robot {
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
-    /// The robot file that was read, and the URDF that it refers to.
+    /// The robot file that was read, the URDF that it refers to, and what they include.
     pub fn inputs(&self) -> Vec<InputRecord> {
-        let kinds = [InputKind::Robot, InputKind::Urdf];
-        self.file.sources.iter().zip(kinds).map(|(source, kind)| InputRecord::of(kind, source)).collect()
+        let kind = |(k, source): (usize, &SourceFile)| {
+            let ends = |end: &str| source.path.to_lowercase().ends_with(end);
+            let kind = match () {
+                () if k == 0 => InputKind::Robot,
+                () if self.file.urdf.as_ref() == Some(&source.path) => InputKind::Urdf,
+                () if [".stl", ".obj", ".msh"].into_iter().any(ends) => InputKind::Mesh,
+                () => InputKind::Included,
+            };
+            InputRecord::of(kind, source)
+        };
+        self.file.sources.iter().enumerate().map(kind).collect()
     }
 
     /// Oddities of the file, each with what mends it; without those of bodies of which the prior tells, or which follow from others.

@@ -7,7 +7,6 @@ use dynid::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
 use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
 use dynid::io::FileMember;
 use dynid::io::MappingSpec;
-use dynid::logs::sha256;
 use dynid_terminal::message::{Failure, Notes, json as print_json, note};
 use dynid_terminal::outputs::{self, is_stdout, marked_toml, marked_xml};
 use dynid_terminal::progress::Progress;
@@ -49,7 +48,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     let identified = dynid::export::IdentifiedRobot::of(&estimate, &args.estimate)?;
     let states = states(args, &estimate, &identified)?;
     let changed = match estimate.robot_file() {
-        Some(record) => sha256(&robot)? != record.sha256,
+        Some(record) => source.sha256() != Some(record.sha256.as_str()),
         None => false,
     };
     let mut export = RobotExport::new(identified.identified(), &source)?;

@@ -87,8 +87,10 @@ struct RobotNames {
 impl RobotNames {
     /// A robot that cannot be read is told of by whoever needs it.
     fn of(path: &Path) -> Self {
-        let stem = path.file_stem().filter(|stem| *stem != "-");
-        let stem = stem.map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
+        let stem = match path == Path::new("-") {
+            true => "robot".to_owned(),
+            false => dynid::io::robot::stem(path),
+        };
         let source = Source::read(path).ok();
         let is_mjcf = source.as_ref().is_some_and(Source::is_mjcf);
         RobotNames {

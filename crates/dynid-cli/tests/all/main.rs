@@ -28,3 +28,4 @@ mod round_trip;
 mod schemas;
 mod study;
 mod support;
+mod xacro;

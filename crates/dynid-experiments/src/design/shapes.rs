@@ -10,7 +10,7 @@ use dynid_identify::Error;
 use dynid_identify::robot::Robot;
 use dynid_model::{Placement, Vec3};
 use dynid_robots::MeshError;
-use dynid_robots::urdf::{LinkShape, Shape, ShapeRole, read_shapes};
+use dynid_robots::urdf::{LinkShape, Shape, ShapeRole, parse_shapes};
 use serde::Serialize;
 
 use super::DesignError;
@@ -110,14 +110,8 @@ fn on_link(link: &str, envelope: Envelope, source: CapsuleSource) -> LinkCapsule
 
 /// Shapes of the robot's URDF; none if it is described otherwise.
 fn shapes_of(robot: &Robot) -> Result<Vec<LinkShape>, Error> {
-    let Some(urdf) = &robot.file.urdf else { return Ok(Vec::new()) };
-    let (shapes, source) = read_shapes(urdf)?;
-    match robot.file.sources.iter().find(|s| s.path == source.path) {
-        Some(first) if first.sha256 != source.sha256 => {
-            Err(Error::Unsupported(format!("{urdf} changed while it was read: run once more")))
-        }
-        _ => Ok(shapes),
-    }
+    let (Some(urdf), Some(text)) = (&robot.file.urdf, &robot.file.xml) else { return Ok(Vec::new()) };
+    Ok(parse_shapes(text, urdf)?)
 }
 
 /// Folders of packages must exist, and something must be looked for in them.

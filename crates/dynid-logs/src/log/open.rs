@@ -72,10 +72,10 @@ impl Container {
 /// Whether a file is a log rather than a robot: told by its first bytes, else by its name (`.csv`, `.tsv`, `.txt`, `.dat`, `.gz`,
 /// `.manifest`), a folder, or a pattern.
 pub fn is_log(path: &Path) -> bool {
-    let FileMember { path, member } = FileMember::of(path);
+    // A world and a xacro have members too.
+    let FileMember { path, .. } = FileMember::of(path);
     let name = path.to_string_lossy().to_lowercase();
-    if member.is_some()
-        || path.is_dir()
+    if path.is_dir()
         || is_manifest(&path)
         || is_pattern(&path)
         || [".csv", ".tsv", ".txt", ".dat", ".gz"].iter().any(|end| name.ends_with(end))

@@ -17,6 +17,7 @@ from . import examples
 from ._commands import Comparison, Design, Gains, Online, check, compare, design, gains
 from ._estimate import Estimate, Factor, identify, identify_file
 from ._fleet import FactorStore, Fleet, ManifestRow, fleet, read_manifest, reduce_log
+from ._descriptions import robot_description
 from ._log import Log, Simulation, find_logs, read_columns, simulate
 from ._native import (
     DynidError,
@@ -68,6 +69,7 @@ __all__ = [
     "read_columns",
     "read_manifest",
     "reduce_log",
+    "robot_description",
     "servo",
     "simulate",
 ]

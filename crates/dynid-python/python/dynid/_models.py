@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._fault import fault
+from ._native import UnsupportedError
+
 Vector = NDArray[np.float64]
 
 _ORDER = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -66,7 +69,7 @@ class _Text:
         pitch: float | None = None,
     ) -> None:
         if name == _GROUND:
-            raise _refuse(f"a body is called `{_GROUND}`, as the base is in robot files", "give it another name")
+            raise fault(UnsupportedError, f"a body is called `{_GROUND}`, as the base is in robot files", "give it another name")
         rotation, position = place
         keys = [f"name = {json.dumps(joint)}", f"kind = {json.dumps(kind)}", f"xyz = {_numbers(position)}", f"rpy = {_numbers(_rpy(rotation))}"]
         if axis is not None:
@@ -102,14 +105,6 @@ def _limits(low: float, high: float, velocity: float = math.inf, effort: float =
     return out
 
 
-def _refuse(what: str, hint: str) -> Exception:
-    from . import UnsupportedError
-
-    error = UnsupportedError(f"{what}\nhint: {hint}")
-    error.hint = hint
-    return error
-
-
 def from_pinocchio(model: Any) -> tuple[str, list[str]]:
     """The robot file of a `pinocchio.Model`, and warnings."""
     pin: Any = import_module("pinocchio")
@@ -131,7 +126,8 @@ def from_pinocchio(model: Any) -> tuple[str, list[str]]:
             text.body(links[i], parent, name, "floating", place, phi=phi)
             continue
         if joint.nv != 1:
-            raise _refuse(
+            raise fault(
+                UnsupportedError,
                 f"joint `{name}` ({joint.shortname()}) has {joint.nv} degrees of freedom",
                 "joints turn, slide, screw or float: build the model with those",
             )
@@ -209,7 +205,8 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             joint, kind = model.joint(j).name or f"joint{j}", int(model.jnt_type[j])
             if kind not in (2, 3):
                 what = "free" if kind == 0 else "ball"
-                raise _refuse(
+                raise fault(
+                UnsupportedError,
                     f"joint `{joint}` of body `{names[b]}` is a {what} joint", "a fixed base, and joints that turn or slide, can be identified"
                 )
             anchor, axis = np.array(model.jnt_pos[j]), np.array(model.jnt_axis[j])
@@ -284,7 +281,7 @@ def _none_held(known: Sequence[str], joints: Mapping[str, Any]) -> None:
     held = [name for name in known if name not in joints]
     if held:
         # Their links are part of the body that carried them, and would count twice.
-        raise _refuse(f"joints {', '.join(held)} of the model were held in the identification", "log them, or export: `to_urdf`, `to_mjcf`")
+        raise fault(UnsupportedError, f"joints {', '.join(held)} of the model were held in the identification", "log them, or export: `to_urdf`, `to_mjcf`")
 
 
 def _missing(kind: str, known: Sequence[str], wanted: Mapping[str, Any]) -> None:

@@ -28,6 +28,7 @@ class Robot:
     def load(
         path: str | os.PathLike[str],
         *,
+        arguments: Mapping[str, str] | None = None,
         gravity: Sequence[float] | None = None,
         couple_mimics: bool = False,
         floating_base: bool = False,
@@ -53,6 +54,8 @@ class Robot:
     def path(self) -> os.PathLike[str]: ...
     @property
     def text(self) -> str | None: ...
+    @property
+    def xml(self) -> str | None: ...
     @property
     def joints(self) -> list[str]: ...
     @property

@@ -18,7 +18,8 @@ from ._settings import as_json
 def robot_path(robot: _native.Robot) -> Iterator[str]:
     """The file of a robot; one without a file has one meanwhile."""
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.abspath(robot.path)
+        # What stands behind `#` is no path: it keeps its points and slashes.
+        path = os.path.join(os.getcwd(), robot.path)
         if robot.text is not None:
             path = str(Path(folder) / "robot.toml")
             if robot.text.lstrip().startswith("<"):

@@ -14,6 +14,7 @@ mod schema;
 mod write;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use dynid_model::closed::ClosureDescription;
 use dynid_model::{Description, Inertia, Mat3, Vec3};
@@ -28,6 +29,7 @@ use toml::Spanned;
 
 pub use write::Loops;
 
+use crate::plain::Plain;
 use crate::robot_error::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 use crate::urdf;
@@ -50,6 +52,8 @@ pub struct RobotFile {
     pub closures: Vec<ClosureDescription>,
     /// Path of the URDF that holds the tree, if the file is a URDF or refers to one.
     pub urdf: Option<String>,
+    /// Text of that URDF, or of the MJCF that the file is; of xacro what it expands to.
+    pub xml: Option<Arc<str>>,
     /// Files of the MJCF that this is, if it is one: the path from the folder of the main file, which itself comes first and is empty.
     pub mjcf: Option<Vec<String>>,
     /// Whether it is an SDF, which is read and not written.
@@ -70,6 +74,7 @@ impl RobotFile {
             home: Vec::new(),
             closures: Vec::new(),
             urdf: None,
+            xml: None,
             mjcf: None,
             sdf: false,
             warnings: Vec::new(),
@@ -143,7 +148,7 @@ pub(crate) fn parse_source(
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let robot: RobotToml = toml::from_str(text).map_err(|e| syntax(text, source_name, &e))?;
     let source = Source { text, file: source_name };
-    let mut urdf_path = None;
+    let (mut urdf_path, mut xml) = (None, None);
     let mut description = match (&robot.joint, &robot.body, &robot.urdf) {
         (Some(rows), None, None) => dh::build(&source, &robot, rows)?,
         (None, Some(bodies), None) => bodies::build(&source, bodies)?,
@@ -151,8 +156,10 @@ pub(crate) fn parse_source(
             let folder = Path::new(source_name).parent().unwrap_or(Path::new(""));
             let path = folder.join(file.get_ref());
             urdf_path = Some(path.display().to_string());
-            let (description, source) = urdf::read_source(&path)?;
-            sources.push(source);
+            let read = Plain::read(&path)?;
+            sources.extend(read.sources);
+            let description = urdf::parse(&read.text, &read.name)?;
+            xml = Some(read.text.into());
             description
         }
         (None, None, None) => {
@@ -184,7 +191,7 @@ pub(crate) fn parse_source(
     let closures = loops::build(&source, &robot.loops, &description)?;
     let actuated = robot.actuated.map(|names| names.into_iter().map(Spanned::into_inner).collect());
     let plain = RobotFile::plain(description, elements);
-    Ok(RobotFile { actuated, home, closures, urdf: urdf_path, sources, ..plain })
+    Ok(RobotFile { actuated, home, closures, urdf: urdf_path, xml, sources, ..plain })
 }
 
 /// `dh` and `tool` belong to DH tables.

@@ -10,7 +10,6 @@ pub(crate) mod xml;
 
 pub use dynamics::dynamics;
 pub use edit::{JointDynamics, edit};
-pub(crate) use read::read_source;
 pub use read::{parse, read};
-pub use shapes::{LinkShape, Shape, ShapeRole, parse_shapes, read_shapes};
+pub use shapes::{LinkShape, Shape, ShapeRole, parse_shapes};
 pub use write::from_description;

@@ -3,29 +3,23 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use dynid_files::digest::SourceFile;
 use dynid_files::excerpt::excerpt;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mimic, Placement, Vec3,
 };
 
 use super::xml::{Attribute, Tag, Tags};
+use crate::plain::Plain;
 use crate::robot_error::{Place, RobotFileError};
 use crate::robot_numbers::{LEAST_LIMIT, is_in_range};
-use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 
 /// Reads a URDF file of at most 64 MiB. See [`parse`].
 ///
 /// # Errors
 /// [`RobotFileError`].
 pub fn read(path: impl AsRef<Path>) -> Result<Description, RobotFileError> {
-    Ok(read_source(path.as_ref())?.0)
-}
-
-/// Reads a URDF, and returns what was read beside it.
-pub(crate) fn read_source(path: &Path) -> Result<(Description, SourceFile), RobotFileError> {
-    let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
-    Ok((parse(&text, &path.display().to_string())?, source))
+    let plain = Plain::read(path.as_ref())?;
+    parse(&plain.text, &plain.name)
 }
 
 /// Reads URDF text; `source_name` stands in messages.

@@ -1,14 +1,10 @@
 //! Shapes of links: what a URDF says about collision and looks.
 
-use std::path::Path;
-
-use dynid_files::digest::SourceFile;
 use dynid_files::excerpt::excerpt;
 use dynid_model::Placement;
 
 use super::read::{Element, Reader};
 use crate::robot_error::RobotFileError;
-use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 
 /// What a shape is meant for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -59,16 +55,6 @@ pub struct LinkShape {
     pub placement: Placement,
     /// The shape.
     pub shape: Shape,
-}
-
-/// Reads the shapes of the links of a URDF file, and says what was read. See [`parse_shapes`].
-///
-/// # Errors
-/// [`RobotFileError`].
-pub fn read_shapes(path: impl AsRef<Path>) -> Result<(Vec<LinkShape>, SourceFile), RobotFileError> {
-    let path = path.as_ref();
-    let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
-    Ok((parse_shapes(&text, &path.display().to_string())?, source))
 }
 
 /// Reads the shapes of the links of a URDF text, in the order of the file; `source_name` stands in messages.

@@ -126,7 +126,7 @@ impl<'a> Tags<'a> {
         self.root_seen = true;
         if name.0.starts_with("xacro:") {
             let found = format!("<{}>", excerpt(name.0));
-            return Err(RobotFileError::Xacro { at: self.place(offset), found });
+            return Err(RobotFileError::Unexpanded { at: self.place(offset), found });
         }
         self.elements += 1;
         let cap = |what, limit| RobotFileError::TooMany { at: self.place(offset), what, limit };
@@ -156,7 +156,7 @@ impl<'a> Tags<'a> {
                 .map_err(|e| self.syntax(offset, format!("XML: {e}")))?
                 .into_owned();
             if value.contains("${") || value.contains("$(") {
-                return Err(RobotFileError::Xacro { at: self.place(offset), found: excerpt(&value) });
+                return Err(RobotFileError::Unexpanded { at: self.place(offset), found: excerpt(&value) });
             }
             if list.len() == MAX_ATTRIBUTES {
                 let (what, limit) = ("attributes of one element", MAX_ATTRIBUTES);

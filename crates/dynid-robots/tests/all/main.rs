@@ -12,3 +12,4 @@ mod mjcf_refused;
 mod oracles;
 mod robot_files;
 mod sdf;
+mod xacro;

@@ -64,10 +64,8 @@ impl StatedRobot {
 
     /// Viscous and Coulomb friction that a URDF states.
     fn dynamics(&self) -> Result<Vec<(String, f64)>, Error> {
-        let Some(path) = &self.file.urdf else { return Ok(Vec::new()) };
-        let text = dynid_files::input::read_text(path.as_ref())
-            .map_err(|source| Error::Read { file: path.into(), source })?;
-        let joints = urdf::dynamics(&text, path)?;
+        let (Some(path), Some(text)) = (&self.file.urdf, &self.file.xml) else { return Ok(Vec::new()) };
+        let joints = urdf::dynamics(text, path)?;
         let values = |j: &urdf::JointDynamics| {
             [(format!("{}.fv", j.joint), j.damping), (format!("{}.fc", j.joint), j.friction)]
         };

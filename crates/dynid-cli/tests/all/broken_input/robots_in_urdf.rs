@@ -89,8 +89,8 @@ fn are_refused() {
             "bad.urdf",
             robot("<link name=\"base\"/>", "<xacro:base/><link name=\"base\"/>"),
             INSPECT,
-            &["bad.urdf:", "xacro:base"],
-            "xacro",
+            &["bad.urdf:", "`xacro:base`, which is not defined"],
+            "xacro bad.urdf > robot.urdf",
         ),
         case(
             "bad.urdf",
