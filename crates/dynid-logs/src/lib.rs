@@ -12,7 +12,7 @@ mod signal;
 pub mod states;
 pub mod stream;
 #[cfg_attr(
-    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    not(all(feature = "arrow", feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
     allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
 )]
 pub mod table_file;

@@ -109,7 +109,14 @@ def write_torch(path: Path, tensors: dict[str, NDArray[Any]]) -> None:
 
     class Tensor:
         def __init__(self, storage: Storage, values: NDArray[Any]) -> None:
-            self.parts: tuple[Any, ...] = (storage, 0, values.shape, tuple(s // values.itemsize for s in values.strides), False, collections.OrderedDict())
+            self.parts: tuple[Any, ...] = (
+                storage,
+                0,
+                values.shape,
+                tuple(s // values.itemsize for s in values.strides),
+                False,
+                collections.OrderedDict(),
+            )
 
         def __reduce__(self) -> Any:
             return _rebuild_tensor_v2, self.parts
@@ -234,6 +241,105 @@ def test_parquet(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Pa
     assert np.isnan(read["q[0]"][7]) and np.isnan(read["q[0]"]).sum() == 1
 
 
+def test_arrow(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    """Files of Feather and streams, as they are and compressed, in batches of any size."""
+    pa = pytest.importorskip("pyarrow")
+    feather = pytest.importorskip("pyarrow.feather")
+    t, q, tau = signals
+    lists = pa.table({"text": ["x", None] * (len(t) // 2), "t": t, "q": pa.array(list(q)), "tau": pa.FixedSizeListArray.from_arrays(tau.ravel(), 6)})
+    wide = pa.table({"t": t, **{f"q_{n}": q[:, k] for k, n in enumerate(NAMES)}, **{f"tau_{n}": tau[:, k] for k, n in enumerate(NAMES)}})
+    labels = pa.array(["a", "b"] * (len(t) // 2)).dictionary_encode()
+    nested = pa.table(
+        {
+            "nothing": pa.nulls(len(t)),
+            "label": labels,
+            "images": pa.array([[[1.0, 2.0], [3.0]]] * len(t)),
+            "t": t,
+            "state": pa.StructArray.from_arrays([pa.array(["y"] * len(t)), pa.array(list(q), pa.large_list(pa.float64()))], ["mode", "q"]),
+            "tau": pa.FixedSizeListArray.from_arrays(tau.ravel(), 6),
+        }
+    )
+    cases: list[tuple[Any, dict[str, Any]]] = [
+        (wide, {"compression": "lz4"}),
+        (wide, {"compression": "zstd", "chunksize": 77}),
+        (lists, {"compression": "uncompressed", "chunksize": 500}),
+        (lists, {"compression": "lz4", "chunksize": 1}),
+        (nested, {"compression": "zstd"}),
+    ]
+    for k, (table, settings) in enumerate(cases):
+        path = tmp_path / f"{k}.feather"
+        feather.write_feather(table, path, **settings)
+        check(indy7, path, signals, of_csv if k == 1 else None, **({"position": "state/q[{}]"} if table is nested else {}))
+    for k, options in enumerate([{}, {"compression": "zstd"}, {"compression": "lz4"}]):
+        path = tmp_path / f"{k}.arrows"
+        with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_stream(sink, lists.schema, options=pa.ipc.IpcWriteOptions(**options)) as writer:
+            writer.write_table(lists, max_chunksize=400)
+        check(indy7, path, signals, of_csv if k == 0 else None)
+        # Of a stream that was cut off the batches that are whole are read.
+        (tmp_path / "cut.arrows").write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+        assert len(dynid.read_columns(tmp_path / "cut.arrows")["t"]) in (400, 800)
+    kinds = {
+        "i8": pa.array([1, None, -3], pa.int8()),
+        "u16": pa.array([1, 2, 65535], pa.uint16()),
+        "half": pa.array(np.array([1.5, 2, 3], np.float16)),
+        "single": pa.array([0.1, None, 3], pa.float32()),
+        "flag": pa.array([True, False, None]),
+        "t": pa.array([START, START + 5, START + 9], pa.timestamp("ns")),
+        "date": pa.array([1, 2, 3], pa.date32()),
+    }
+    for slice_ in (slice(0, 3), slice(1, 3)):
+        table = pa.table(kinds).slice(slice_.start, 3 - slice_.start)
+        feather.write_feather(table, tmp_path / "kinds.feather")
+        read = dynid.read_columns(tmp_path / "kinds.feather", columns={"missing": "drop"})
+        np.testing.assert_array_equal(read["i8"], [1, np.nan, -3][slice_])
+        np.testing.assert_array_equal(read["u16"], [1, 2, 65535][slice_])
+        np.testing.assert_array_equal(read["half"], [1.5, 2, 3][slice_])
+        np.testing.assert_array_equal(read["single"], np.array([0.1, np.nan, 3], np.float32)[slice_].astype(float))
+        np.testing.assert_array_equal(read["flag"], [1, 0, np.nan][slice_])
+        np.testing.assert_array_equal(read["date"], [1, 2, 3][slice_])
+        np.testing.assert_array_equal(read["t"], [START, START + 5, START + 9][slice_])
+    (tmp_path / "old.feather").write_bytes(b"FEA1" + bytes(100))
+    with pytest.raises(dynid.LogError, match="Feather of version 1"):
+        dynid.read_columns(tmp_path / "old.feather")
+
+
+def test_long_tables_are_reduced_group_by_group(tmp_path: Path) -> None:
+    """Groups of rows of Parquet and batches of Arrow give the numbers of the text, stamps of many digits too."""
+    pa = pytest.importorskip("pyarrow")
+    pq = pytest.importorskip("pyarrow.parquet")
+    feather = pytest.importorskip("pyarrow.feather")
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=200, rate_hz=1000, seed=4)
+    names = arm.joints
+    stamps = START + np.arange(len(made.q)) * 1_000_000
+    columns = {"t": stamps, **{f"q_{n}": made.q[:, k] for k, n in enumerate(names)}, **{f"tau_{n}": made.tau[:, k] for k, n in enumerate(names)}}
+    table = pa.table(columns)
+    importlib.import_module("pyarrow.csv").write_csv(table, tmp_path / "log.csv")
+    pq.write_table(table, tmp_path / "log.parquet", row_group_size=30_000)
+    pq.write_table(table, tmp_path / "one.parquet", row_group_size=200_000, compression="zstd")
+    feather.write_feather(table, tmp_path / "log.feather", chunksize=7_000)
+    dynid_command = dynid._native.command_line
+    (tmp_path / "arm.toml").write_text(dynid.examples.TWO_LINKS)
+    (tmp_path / "run.toml").write_text('robot = "arm.toml"\n[[log]]\npath = "log.csv"\nrows = [1, 60000]\n')
+    recipe = tmp_path / "type.factors"
+    assert dynid_command(["dynid", "reduce", str(tmp_path / "run.toml"), "--out", str(recipe), "--quiet"]) == 0
+
+    def found(name: str) -> bytes:
+        """The triangles of a factor file: what stands behind its description, which names the file, and before its digest."""
+        made = dynid.reduce_log(tmp_path / name, recipe, robot="r", name="log")
+        assert made.startswith(b"dynid factors 1\n"), made[:500]
+        behind = 24 + int.from_bytes(made[16:24], "little")
+        assert f'"samples":{count}' in made[24:behind].decode().replace(" ", "")
+        return made[behind:-32]
+
+    count = len(stamps)
+
+    expected = found("log.csv")
+    assert len(expected) > 1000
+    for name in ("log.parquet", "one.parquet", "log.feather"):
+        assert found(name) == expected, name
+
+
 def test_episodes_of_lerobot(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
     pa = pytest.importorskip("pyarrow")
     pq = pytest.importorskip("pyarrow.parquet")
@@ -317,9 +423,9 @@ def test_mcap(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path,
     np.testing.assert_array_equal(raw["receive_time"], START + STEP * np.arange(len(q)) + 3_000_000 + late)
     received = dynid.read_columns(path, indy7, columns={"time": "receive_time"})
     np.testing.assert_allclose(received["t"], STEP * 1e-9 * np.arange(len(q)) + (late - late[0]) * 1e-9, atol=1e-12)
-    # Whatever a bag is cut to is read up to the cut, or refused.
+    # Whatever a bag is cut to is read up to the cut, or refused. `DYNID_CUTS`: a cut at every so many bytes.
     whole = path.read_bytes()
-    for end in range(1000, len(whole), max(1000, len(whole) // 40)):
+    for end in range(1000, len(whole), int(os.environ.get("DYNID_CUTS", max(1000, len(whole) // 40)))):
         (tmp_path / "cut.mcap").write_bytes(whole[:end])
         try:
             cut = dynid.read_columns(tmp_path / "cut.mcap", indy7)
@@ -327,6 +433,35 @@ def test_mcap(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path,
             assert end < 60_000
         else:
             np.testing.assert_array_equal(cut["q_j1"], q[: len(cut["t"]), 0])
+
+
+def test_mcap_in_json(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    """Messages without a definition that is read, as Foxglove's tools write them."""
+    writer = pytest.importorskip("mcap.writer")
+    _, q, tau = signals
+    path = tmp_path / "log.mcap"
+    with open(path, "wb") as file:
+        mcap = writer.Writer(file, compression=writer.CompressionType.LZ4)
+        mcap.start("x-test", library="test")
+        schema = mcap.register_schema(name="JointState", encoding="jsonschema", data=b'{"type": "object"}')
+        channel = mcap.register_channel(topic="/joint_states", message_encoding="json", schema_id=schema)
+        for row in range(len(q)):
+            ns = START + STEP * row
+            message: dict[str, Any] = {
+                "header": {"stamp": {"sec": ns // 10**9, "nsec": ns % 10**9}, "frame_id": "base"},
+                "name": NAMES,
+                "position": q[row].tolist(),
+                "effort": tau[row].tolist(),
+                "extra": {"gain": 1.5, "ok": True, "mixed": [1, "a"], "label": "x"},
+            }
+            if row % 3 == 1:
+                message = {"a first key": 7, **message}
+            mcap.add_message(channel_id=channel, log_time=ns, publish_time=ns, data=json.dumps(message).encode())
+        mcap.finish()
+    check(indy7, path, signals, of_csv)
+    raw = dynid.read_columns(path, columns={"missing": "drop"})
+    assert (raw["/joint_states/extra/gain"] == 1.5).all() and (raw["/joint_states/extra/ok"] == 1).all()
+    assert np.isnan(raw["/joint_states/a first key"]).sum() == len(q) - len(q) // 3
 
 
 def test_topics_with_stamps_of_their_own_are_joined(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
@@ -362,7 +497,13 @@ def test_publishers_that_share_a_topic_are_joined(tmp_path: Path, signals: Signa
         for part, ns in [(slice(0, 5), START + STEP * row), (slice(5, 6), START + STEP * row + late)]:
             if part.start and row % 3:
                 continue
-            message = {"header": {"stamp": stamp(ns)}, "name": NAMES[part], "position": q[row, part].tolist(), "velocity": [], "effort": tau[row, part].tolist()}
+            message = {
+                "header": {"stamp": stamp(ns)},
+                "name": NAMES[part],
+                "position": q[row, part].tolist(),
+                "velocity": [],
+                "effort": tau[row, part].tolist(),
+            }
             mcap.write_message("/joint_states", schema, message, log_time=ns, publish_time=ns)
 
     path = tmp_path / "log.mcap"
@@ -380,6 +521,7 @@ def test_a_pipe_is_no_file_with_an_index(signals: Signals, tmp_path: Path) -> No
     t, q, tau = signals
     np.savez(tmp_path / "a.npz", t=t, q=q, tau=tau)
     os.mkfifo(tmp_path / "pipe")
+
     def quietly() -> None:
         with contextlib.suppress(BrokenPipeError):
             (tmp_path / "pipe").write_bytes((tmp_path / "a.npz").read_bytes())
@@ -475,10 +617,14 @@ def small_files(folder: Path) -> list[Path]:
             with h5py.File(made(f"{k}.h5"), "w") as file:
                 file.create_dataset("g/t", data=t, **settings)
                 file["g/q"] = q
-    if (pa := found("pyarrow")) and (pq := found("pyarrow.parquet")):
+    if (pa := found("pyarrow")) and (pq := found("pyarrow.parquet")) and found("pyarrow.feather"):
         table = pa.table({"t": t, "q": pa.array(list(q)), "n": pa.array([None, *t[1:]]), "s": ["x"] * count})
         for name in ["none", "snappy", "gzip", "lz4", "zstd"]:
             pq.write_table(table, made(f"{name}.parquet"), compression=name, row_group_size=15)
+        for name in ["uncompressed", "lz4", "zstd"]:
+            pa.feather.write_feather(table, made(f"{name}.feather"), compression=name, chunksize=15)
+        with pa.OSFile(str(made("a.arrows")), "wb") as sink, pa.ipc.new_stream(sink, table.schema) as writer:
+            writer.write_table(table, max_chunksize=15)
     with sqlite3.connect(made("a.db3")) as base:
         base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL)")
         base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)")
@@ -488,12 +634,26 @@ def small_files(folder: Path) -> list[Path]:
             base.execute("INSERT INTO messages(topic_id,timestamp,data) VALUES(1,?,?)", (START + row, data))
     base.close()
     if (mcap := found("mcap.writer")) and (ros2 := found("mcap_ros2.writer")):
+        with open(made("json.mcap"), "wb") as raw:
+            plain = mcap.Writer(raw, compression=mcap.CompressionType.NONE)
+            plain.start("x", library="x")
+            channel = plain.register_channel(topic="/j", message_encoding="json", schema_id=0)
+            for row in range(count):
+                text = json.dumps({"t": {"sec": 1, "nsec": row}, "name": ["a", "b"], "q": list(q[row]), "list": [{"name": "c", "x": 1}]})
+                plain.add_message(channel_id=channel, log_time=START + row, publish_time=START, data=text.encode())
+            plain.finish()
         for compression in mcap.CompressionType:
             with open(made(f"{compression.name}.mcap"), "wb") as raw:
                 writer = ros2.Writer(raw, compression=compression, chunk_size=1000)
                 schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
                 for row in range(count):
-                    message = {"header": {"stamp": stamp(START + row)}, "name": ["a", "b"], "position": list(q[row]), "velocity": [], "effort": [0.0, 1.0]}
+                    message = {
+                        "header": {"stamp": stamp(START + row)},
+                        "name": ["a", "b"],
+                        "position": list(q[row]),
+                        "velocity": [],
+                        "effort": [0.0, 1.0],
+                    }
                     writer.write_message("/j", schema, message, log_time=START + row, publish_time=START)
                 writer.finish()
     if (rosbag1 := found("rosbags.rosbag1")) and (typesys := found("rosbags.typesys")):

@@ -1,9 +1,11 @@
 //! Files of arrays and tables as logs: which arrays make up the rows, and their numbers.
 
+use std::ops::Range;
+
 use dynid_files::excerpt::listed;
 
 use super::header::LogHeader;
-use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
+use super::{LogOptions, LogSource, Missing, ReadingNote, TableBlocks, Wanted, one_block, places_of};
 use crate::csv::{LogFileError, MAX_COLUMNS, Table};
 use crate::signal::is_time_name;
 
@@ -16,6 +18,31 @@ pub(super) enum Values {
     Float(Vec<f64>),
     /// Whole numbers keep all their digits.
     Whole(Vec<i64>),
+}
+
+impl Values {
+    /// Puts others behind them. Whole numbers beside floats become floats.
+    pub(super) fn append(&mut self, more: Values) {
+        match (&mut *self, more) {
+            (Values::Whole(own), Values::Whole(more)) => own.extend(more),
+            (Values::Float(own), Values::Float(more)) => own.extend(more),
+            (Values::Float(own), Values::Whole(more)) => own.extend(more.into_iter().map(|x| x as f64)),
+            (Values::Whole(own), Values::Float(more)) => {
+                let floats = own.iter().map(|x| *x as f64).chain(more).collect();
+                *self = Values::Float(floats);
+            }
+        }
+    }
+
+    /// Values that are not there become NaN.
+    pub(super) fn lose(&mut self, places: Range<usize>) {
+        if let Values::Whole(own) = self {
+            *self = Values::Float(own.iter().map(|x| *x as f64).collect());
+        }
+        if let Values::Float(own) = self {
+            own[places].fill(f64::NAN);
+        }
+    }
 }
 
 /// What an array holds.
@@ -36,7 +63,7 @@ pub(super) struct Array {
 }
 
 /// A file of arrays that can be loaded one by one.
-pub(super) trait ArrayFile {
+pub(super) trait ArrayFile: Send {
     /// Its arrays, in the order of the file.
     fn arrays(&self) -> &[Array];
 
@@ -45,6 +72,24 @@ pub(super) trait ArrayFile {
     /// # Errors
     /// What is wrong with the file.
     fn load(&mut self, array: usize) -> Result<Values, String>;
+
+    /// Rows that lie together in the file, group by group, where some can be loaded without the others.
+    fn groups(&self) -> Option<Vec<usize>> {
+        None
+    }
+
+    /// Numbers of some rows of an array whose first axis is that of the rows.
+    ///
+    /// # Errors
+    /// As [`ArrayFile::load`].
+    fn load_rows(&mut self, array: usize, rows: Range<usize>) -> Result<Values, String> {
+        let width = self.arrays()[array].shape.get(1).copied().unwrap_or(1);
+        let inside = rows.start * width..rows.end * width;
+        Ok(match self.load(array)? {
+            Values::Float(all) => Values::Float(all[inside].to_vec()),
+            Values::Whole(all) => Values::Whole(all[inside].to_vec()),
+        })
+    }
 }
 
 /// Where a column of the table lies.
@@ -180,12 +225,45 @@ impl ArrayLog {
         })
     }
 
+    /// A table of columns; `part`: rows that are loaded alone, which must be those of the builder.
+    fn table(
+        &mut self,
+        mut builder: TableBuilder,
+        columns: &[usize],
+        times: &[usize],
+        missing: Missing,
+        part: Option<Range<usize>>,
+    ) -> Result<Table, LogFileError> {
+        let (file, format) = (|| self.file.clone(), self.format);
+        let mut loaded: Option<(usize, Values)> = None;
+        for k in columns {
+            let Place { array, first, step } = self.places[*k];
+            let name = &self.header.names[*k];
+            if self.header.text[*k] {
+                let (expected, found) = (format!("numbers in `{name}`"), "texts".to_owned());
+                return Err(LogFileError::Content { file: file(), format, expected, found });
+            }
+            if loaded.as_ref().is_none_or(|(of, _)| *of != array) {
+                let values = match &part {
+                    Some(rows) => self.source.load_rows(array, rows.clone()),
+                    None => self.source.load(array),
+                };
+                let damaged = |reason| LogFileError::Damaged { file: file(), format, reason };
+                loaded = Some((array, values.map_err(damaged)?));
+            }
+            let Some((_, values)) = &loaded else { continue };
+            builder.add(name, values, first, step, times.contains(k), missing)?;
+        }
+        Ok(builder.finish(String::new()))
+    }
+
     /// Bytes that the arrays of these columns take.
     fn bytes(&self, columns: &[usize]) -> u64 {
         let mut arrays: Vec<usize> = columns.iter().map(|k| self.places[*k].array).collect();
         arrays.dedup();
         let all = self.source.arrays();
-        arrays.iter().map(|k| all[*k].shape.iter().fold(8, |n: u64, m| n.saturating_mul(*m as u64))).sum()
+        let own = |k: &usize| all[*k].shape.iter().fold(8, |n: u64, m| n.saturating_mul(*m as u64));
+        arrays.iter().map(own).fold(0, u64::saturating_add)
     }
 }
 
@@ -200,55 +278,159 @@ impl LogSource for ArrayLog {
 
     fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
         let (columns, times) = places_of(&self.header, &self.header(), wanted);
-        let (file, format) = (self.file.clone(), self.format);
         let (read, bytes) = (&self.options.read, self.bytes(&columns));
         let most =
             if bytes > read.ratio_grace { read.max_ratio.saturating_mul(self.file_bytes) } else { u64::MAX };
         if bytes > read.max_bytes.min(most) {
             let reason =
                 format!("expected at most {} bytes of numbers, found {bytes}", read.max_bytes.min(most));
-            return Err(LogFileError::Damaged { file, format, reason });
+            return Err(LogFileError::Damaged { file: self.file, format: self.format, reason });
         }
-        let mut out = TableBuilder::new(&self.file, self.rows, &self.options)?;
-        let mut loaded: Option<(usize, Values)> = None;
-        for k in columns {
-            let Place { array, first, step } = self.places[k];
-            let name = &self.header.names[k];
-            if self.header.text[k] {
-                let (expected, found) = (format!("numbers in `{name}`"), "texts".to_owned());
-                return Err(LogFileError::Content { file, format, expected, found });
-            }
-            if loaded.as_ref().is_none_or(|(of, _)| *of != array) {
-                let values = self.source.load(array).map_err(|reason| LogFileError::Damaged {
-                    file: file.clone(),
-                    format,
-                    reason,
-                })?;
-                loaded = Some((array, values));
-            }
-            let Some((_, values)) = &loaded else { continue };
-            out.add(name, values, first, step, times.contains(&k), wanted.missing)?;
+        let rows = self.options.read.rows;
+        let builder = TableBuilder::new(&self.file, self.rows, rows, &self.options)?;
+        let table = self.table(builder, &columns, &times, wanted.missing, None)?;
+        Ok((Table { sha256: self.sha256, ..table }, self.notes))
+    }
+
+    fn blocks(self: Box<Self>, wanted: &Wanted, rows: usize) -> Result<Box<dyn TableBlocks>, LogFileError> {
+        let Some(groups) = self.source.groups() else { return one_block(self, wanted) };
+        let (columns, times) = places_of(&self.header, &self.header(), wanted);
+        let (first, last) = TableBuilder::rows_of(&self.file, self.rows, self.options.read.rows)?;
+        let most = (MAX_BLOCK / (8 * columns.len().max(1))).max(rows);
+        let mut parts = blocks_of(&groups, first - 1..last, rows.max(MIN_BLOCK), most);
+        parts.reverse();
+        let (missing, per_block) = (wanted.missing, rows.max(1));
+        Ok(Box::new(ArrayBlocks { log: *self, columns, times, missing, per_block, parts, loaded: None }))
+    }
+}
+
+/// Fewest rows of a block: groups may be of single rows.
+const MIN_BLOCK: usize = 1 << 16;
+/// Bytes of numbers from which on a group is read in parts, at the price of passing over what comes before them.
+const MAX_BLOCK: usize = 96 << 20;
+
+/// Parts of the wanted rows: groups put together up to `least` rows, and taken apart from `most` rows on.
+fn blocks_of(groups: &[usize], wanted: Range<usize>, least: usize, most: usize) -> Vec<Range<usize>> {
+    let mut parts: Vec<Range<usize>> = Vec::new();
+    let mut start = 0;
+    for group in groups {
+        let own = start.max(wanted.start)..(start + group).min(wanted.end);
+        start += group;
+        if own.is_empty() {
+            continue;
         }
-        Ok((out.finish(self.sha256), self.notes))
+        match parts.last_mut() {
+            Some(last) if last.len() < least && last.len() + own.len() <= most => last.end = own.end,
+            _ => {
+                parts.extend(own.clone().step_by(most.max(1)).map(|k| k..own.end.min(k.saturating_add(most))))
+            }
+        }
+    }
+    parts
+}
+
+/// Rows of a file whose groups of rows are loaded one by one, given as many at a time as of text: what is found on the first rows of a log must
+/// not depend on its format.
+struct ArrayBlocks {
+    log: ArrayLog,
+    columns: Vec<usize>,
+    times: Vec<usize>,
+    missing: Missing,
+    per_block: usize,
+    /// Rows that are still to be loaded, the next ones last.
+    parts: Vec<Range<usize>>,
+    /// Rows that were loaded, and how many of them were given.
+    loaded: Option<(Table, usize)>,
+}
+
+impl ArrayBlocks {
+    /// Loads the next rows behind those that were not given yet.
+    fn load(&mut self, part: Range<usize>) -> Result<(), LogFileError> {
+        let rows = Some((part.start + 1, part.end));
+        let mut builder = TableBuilder::new(&self.log.file, self.log.rows, rows, &self.log.options)?;
+        // What is loaded begins with these rows.
+        builder.skipped = 0;
+        builder.origins = self.loaded.as_ref().map(|(table, _)| table.origin.clone());
+        let mut more = self.log.table(builder, &self.columns, &self.times, self.missing, Some(part))?;
+        if let Some((before, given)) = self.loaded.take() {
+            more.rows += before.rows - given;
+            more.first_row = before.first_row + given;
+            for (column, before) in more.columns.iter_mut().zip(before.columns) {
+                column.splice(0..0, before[given..].iter().copied());
+            }
+        }
+        self.loaded = Some((more, 0));
+        Ok(())
+    }
+}
+
+impl TableBlocks for ArrayBlocks {
+    fn next_block(&mut self) -> Result<Option<Table>, LogFileError> {
+        let left = |own: &Self| own.loaded.as_ref().map_or(0, |(table, given)| table.rows - given);
+        while left(self) < self.per_block
+            && let Some(part) = self.parts.pop()
+        {
+            self.load(part)?;
+        }
+        let count = left(self).min(self.per_block);
+        let Some((table, given)) = self.loaded.as_mut().filter(|_| count > 0) else { return Ok(None) };
+        let rows = *given..*given + count;
+        *given += count;
+        Ok(Some(Table {
+            source: table.source.clone(),
+            header: table.header.clone(),
+            columns: table.columns.iter().map(|column| column[rows.clone()].to_vec()).collect(),
+            rows: count,
+            first_row: table.first_row + rows.start,
+            origin: table.origin.clone(),
+            sha256: String::new(),
+        }))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
+        Ok((self.log.sha256, self.log.notes))
     }
 }
 
 /// Puts columns together: the rows asked for, digits of long stamps, and what is no signal.
-pub(super) struct TableBuilder<'a> {
+pub(super) struct TableBuilder {
     table: Table,
     skipped: usize,
-    options: &'a LogOptions,
+    /// What is taken from long stamps, column by column, where rows before these say it.
+    origins: Option<Vec<i64>>,
+    /// Largest magnitude of a signal.
+    max_magnitude: f64,
 }
 
-impl<'a> TableBuilder<'a> {
+impl TableBuilder {
+    /// The first and the last row that are wanted, from 1.
+    ///
     /// # Errors
     /// [`LogFileError::RowRange`]: the log does not have these rows.
-    pub(super) fn new(file: &str, rows: usize, options: &'a LogOptions) -> Result<Self, LogFileError> {
-        let (first, last) = options.read.rows.unwrap_or((1, rows));
+    fn rows_of(
+        file: &str,
+        rows: usize,
+        wanted: Option<(usize, usize)>,
+    ) -> Result<(usize, usize), LogFileError> {
+        let (first, last) = wanted.unwrap_or((1, rows));
         if first == 0 || first > last || last > rows {
             let found = if first == 0 { "row 0".to_owned() } else { format!("{rows} rows") };
             return Err(LogFileError::RowRange { file: file.to_owned(), first, last, found });
         }
+        Ok((first, last))
+    }
+
+    /// `wanted`: the first and the last row, from 1.
+    ///
+    /// # Errors
+    /// As [`TableBuilder::rows_of`].
+    pub(super) fn new(
+        file: &str,
+        rows: usize,
+        wanted: Option<(usize, usize)>,
+        options: &LogOptions,
+    ) -> Result<Self, LogFileError> {
+        let (first, last) = TableBuilder::rows_of(file, rows, wanted)?;
         let table = Table {
             source: file.to_owned(),
             header: Vec::new(),
@@ -258,7 +440,8 @@ impl<'a> TableBuilder<'a> {
             origin: Vec::new(),
             sha256: String::new(),
         };
-        Ok(TableBuilder { table, skipped: first - 1, options })
+        let max_magnitude = options.read.max_magnitude;
+        Ok(TableBuilder { table, skipped: first - 1, origins: None, max_magnitude })
     }
 
     /// Adds a column; of its numbers, row `k` has that at `first + k * step`.
@@ -275,10 +458,12 @@ impl<'a> TableBuilder<'a> {
         missing: Missing,
     ) -> Result<(), LogFileError> {
         let places = (0..self.table.rows).map(|k| first + (self.skipped + k) * step);
+        let given = self.origins.as_ref().and_then(|all| all.get(self.table.origin.len()).copied());
         let (column, origin): (Vec<f64>, i64) = match values {
             Values::Whole(whole) => {
                 let start = whole.get(first + self.skipped * step).copied().unwrap_or(0);
-                let origin = if is_time && start.unsigned_abs() as f64 >= LONG_STAMP { start } else { 0 };
+                let is_long = is_time && start.unsigned_abs() as f64 >= LONG_STAMP;
+                let origin = given.unwrap_or(if is_long { start } else { 0 });
                 (
                     places
                         .map(|k| whole.get(k).map_or(f64::NAN, |x| x.wrapping_sub(origin) as f64))
@@ -290,11 +475,11 @@ impl<'a> TableBuilder<'a> {
                 let start = numbers.get(first + self.skipped * step).copied().unwrap_or(0.0);
                 // Floats that fit, so that the difference to their neighbours is exact.
                 let is_long = is_time && (LONG_STAMP..9e15).contains(&start.abs());
-                let origin = if is_long { start.trunc() } else { 0.0 };
+                let origin = given.map_or(if is_long { start.trunc() } else { 0.0 }, |origin| origin as f64);
                 (places.map(|k| numbers.get(k).map_or(f64::NAN, |x| x - origin)).collect(), origin as i64)
             }
         };
-        let limit = if is_time { f64::MAX } else { self.options.read.max_magnitude };
+        let limit = if is_time { f64::MAX } else { self.max_magnitude };
         let wrong = |x: &f64| !(x.abs() <= limit || (x.is_nan() && missing != Missing::Error));
         if let Some(k) = column.iter().position(wrong) {
             let expected = match column[k] {
@@ -374,11 +559,18 @@ mod tests {
     }
 
     #[test]
+    fn groups_are_put_together_and_taken_apart() {
+        assert_eq!(blocks_of(&[3, 3, 10, 1], 1..16, 4, 8), [1..6, 6..14, 14..16]);
+        assert_eq!(blocks_of(&[100], 0..100, 1, 40), [0..40, 40..80, 80..100]);
+        assert_eq!(blocks_of(&[2, 2], 0..0, 1, 40), [0..0; 0]);
+    }
+
+    #[test]
     fn digits_of_long_stamps_are_kept() {
         let options = LogOptions::default();
         let start = 1_700_000_000_123_456_789_i64;
         let stamps = Values::Whole((0..3).map(|k| start + 1_000_001 * k).collect());
-        let mut builder = TableBuilder::new("log", 3, &options).unwrap();
+        let mut builder = TableBuilder::new("log", 3, None, &options).unwrap();
         builder.add("t", &stamps, 0, 1, true, Missing::Error).unwrap();
         let table = builder.finish(String::new());
         assert_eq!(

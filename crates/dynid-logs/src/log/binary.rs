@@ -25,7 +25,8 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    fn size(self) -> usize {
+    /// Bytes of a number.
+    pub(super) fn size(self) -> usize {
         match self.kind {
             Kind::Half => 2,
             Kind::Single => 4,

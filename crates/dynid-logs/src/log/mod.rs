@@ -8,29 +8,37 @@
 //! message, their topics joined by time.
 
 #[cfg_attr(
-    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    not(all(feature = "arrow", feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
     allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
 )]
 mod arrays;
+#[cfg(feature = "arrow")]
+mod arrow;
 #[cfg(feature = "bags")]
 mod bag;
-#[cfg(feature = "numpy")]
+#[cfg(any(feature = "arrow", feature = "numpy"))]
 mod binary;
 mod files;
 mod format;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 mod header;
+#[cfg(any(feature = "arrow", feature = "bags", feature = "parquet"))]
+#[cfg_attr(
+    not(all(feature = "arrow", feature = "bags")),
+    allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
+)]
+mod inflate;
 mod matlab;
 #[cfg_attr(
-    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    not(all(feature = "arrow", feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
     allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
 )]
 mod member;
 #[cfg(feature = "numpy")]
 mod numpy;
 #[cfg_attr(
-    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    not(all(feature = "arrow", feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
     allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
 )]
 mod open;
@@ -108,16 +116,25 @@ pub trait LogSource {
     /// [`LogFileError`], the first fault met.
     fn read(self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError>;
 
-    /// Reads columns as [`LogSource::read`] does, so many rows at a time where the format allows it (text); other formats give all rows at once.
+    /// Reads columns as [`LogSource::read`] does, about so many rows at a time where the format allows it: text, and groups of rows of Parquet and Arrow,
+    /// whose blocks are larger. Other formats give all rows at once.
     ///
     /// # Errors
     /// [`LogFileError`], the first fault met; later ones come with the rows.
     fn blocks(self: Box<Self>, wanted: &Wanted, rows: usize) -> Result<Box<dyn TableBlocks>, LogFileError> {
         let _ = rows;
-        let (mut table, notes) = self.read(wanted)?;
-        let sha256 = std::mem::take(&mut table.sha256);
-        Ok(Box::new(OneBlock { table: Some(table), sha256, notes }))
+        one_block(self, wanted)
     }
+}
+
+/// All rows of a log as one block.
+fn one_block<S: LogSource + ?Sized>(
+    log: Box<S>,
+    wanted: &Wanted,
+) -> Result<Box<dyn TableBlocks>, LogFileError> {
+    let (mut table, notes) = log.read(wanted)?;
+    let sha256 = std::mem::take(&mut table.sha256);
+    Ok(Box::new(OneBlock { table: Some(table), sha256, notes }))
 }
 
 /// Rows of a log, block by block.

@@ -30,6 +30,7 @@ enum Container {
     RosBag,
     Sqlite,
     Arrow,
+    Feather,
     Zstd,
 }
 
@@ -46,7 +47,9 @@ impl Container {
             () if begins(b"\x89MCAP0\r\n") => Container::Mcap,
             () if begins(b"#ROSBAG V") => Container::RosBag,
             () if begins(b"SQLite format 3\0") => Container::Sqlite,
-            () if begins(b"ARROW1") => Container::Arrow,
+            // A stream of messages, the description of the fields first, has no mark of its own.
+            () if begins(b"ARROW1") || begins(&[0xff; 4]) => Container::Arrow,
+            () if begins(b"FEA1") => Container::Feather,
             () if begins(b"\x28\xb5\x2f\xfd") => Container::Zstd,
             () => return None,
         })
@@ -63,7 +66,8 @@ impl Container {
             Container::Mcap => ("MCAP", "bags"),
             Container::RosBag => ("ROS 1 bag", "bags"),
             Container::Sqlite => ("ROS 2 bag in SQLite", "bags"),
-            Container::Arrow => ("Arrow file", ""),
+            Container::Arrow => ("Arrow", "arrow"),
+            Container::Feather => ("Feather of version 1", ""),
             Container::Zstd => ("file compressed with zstd", ""),
         }
     }
@@ -281,6 +285,12 @@ impl Container {
                 }
                 (Box::new(read), format)
             }
+            #[cfg(feature = "arrow")]
+            Container::Arrow => {
+                no_member()?;
+                let read = super::arrow::Arrow::open(reopened(path).map_err(damaged)?);
+                (Box::new(read.map_err(damaged)?), format)
+            }
             #[cfg(feature = "bags")]
             Container::Mcap | Container::RosBag | Container::Sqlite => {
                 let format = match self {
@@ -298,7 +308,7 @@ impl Container {
                         expected: "a format that is read".to_owned(),
                         found: match self {
                             Container::Zstd => "one to decompress first: `zstd -d FILE`".to_owned(),
-                            _ => "one that is not: write it as MCAP, Parquet, HDF5 or CSV".to_owned(),
+                            _ => "one that is not: write it as Arrow, MCAP, Parquet, HDF5 or CSV".to_owned(),
                         },
                     },
                     _ => LogFileError::NotBuilt { file: name, format, feature },

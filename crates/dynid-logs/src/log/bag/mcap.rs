@@ -1,19 +1,17 @@
 //! MCAP: topics with the definitions of their messages, and the messages, in compressed chunks.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use dynid_files::input::{self, Opened};
-use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{McapError, McapResult};
 
 use super::file::{BagFile, End, RawMessage, Take, Topic, Waiting};
+use super::mcap_records::{self, Fields, MAGIC};
 
-/// Largest chunk and record, bytes, compressed or not.
-const MAX_RECORD: usize = 512 << 20;
+/// Bytes that are read at a time.
+const BUFFER: usize = 1 << 18;
 const SCHEMA: u8 = 0x03;
 const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
@@ -109,44 +107,16 @@ impl Mcap {
         stretches: &[Stretch],
         take: &mut dyn FnMut(Found<'_>) -> ControlFlow<()>,
     ) -> Result<End, String> {
-        let is_all = stretches == [self.whole()];
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(!is_all)
-            .with_skip_end_magic(!is_all)
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(MAX_RECORD);
-        let mut reader = LinearReader::new_with_options(options);
-        for added in [reader.add_decompressor(Inflated::zstd()), reader.add_decompressor(Inflated::lz4())] {
-            added.map_err(|e| e.to_string())?;
-        }
         let file = input::open(&self.path).map_err(|e| e.to_string())?;
-        let mut source = Stretches { file, waiting: stretches.iter().rev().copied().collect(), left: 0 };
+        let source = Stretches { file, waiting: stretches.iter().rev().copied().collect(), left: 0 };
         let mut schemas: BTreeMap<u16, (String, String, String)> = BTreeMap::new();
-        while let Some(event) = reader.next_event() {
-            let event = match event {
-                Ok(event) => event,
-                Err(e) => return Ok(End::Broken(e.to_string())),
-            };
-            match event {
-                LinearReadEvent::ReadRequest(count) => {
-                    // A stretch at a time, in pieces: what a broken length asks for is not there.
-                    let count = count.clamp(1, 1 << 20);
-                    let read = source.read(reader.insert(count)).map_err(|e| e.to_string())?;
-                    reader.notify_read(read);
-                }
-                LinearReadEvent::Record { opcode, data } => {
-                    let found = match found(opcode, data, &mut schemas) {
-                        Ok(Some(found)) => found,
-                        Ok(None) => continue,
-                        Err(e) => return Ok(End::Broken(e)),
-                    };
-                    if take(found).is_break() {
-                        return Ok(End::Whole);
-                    }
-                }
-            }
-        }
-        Ok(End::Whole)
+        let is_whole = stretches == [self.whole()];
+        mcap_records::walk(BufReader::with_capacity(BUFFER, source), is_whole, &mut |opcode, data| {
+            Ok(match found(opcode, data, &mut schemas)? {
+                Some(found) => take(found),
+                None => ControlFlow::Continue(()),
+            })
+        })
     }
 }
 
@@ -244,32 +214,6 @@ fn found<'a>(
     }
 }
 
-/// Fields of a record one behind the other. The library has types for records, which reserve what a length promises before they look for it.
-struct Fields<'a>(&'a [u8]);
-
-impl<'a> Fields<'a> {
-    fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
-        let (part, rest) =
-            self.0.split_at_checked(count).ok_or("expected a field of a record, found its end")?;
-        self.0 = rest;
-        Ok(part)
-    }
-
-    fn number(&mut self, size: usize) -> Result<u64, String> {
-        Ok(self.take(size)?.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
-    }
-
-    /// Bytes behind their length.
-    fn part(&mut self) -> Result<&'a [u8], String> {
-        let length = self.number(4)? as usize;
-        self.take(length)
-    }
-
-    fn text(&mut self) -> Result<String, String> {
-        Ok(String::from_utf8_lossy(self.part()?).into_owned())
-    }
-}
-
 /// Where the summary of a file begins, if it has one.
 fn summary_start(file: &mut Opened, length: u64) -> Option<u64> {
     let mut footer = [0; FOOTER as usize];
@@ -278,7 +222,7 @@ fn summary_start(file: &mut Opened, length: u64) -> Option<u64> {
     let mut fields = Fields(&footer);
     let is_footer = fields.number(1) == Ok(2) && fields.number(8) == Ok(20);
     let start = fields.number(8).ok()?;
-    (is_footer && footer.ends_with(mcap::MAGIC) && start > 0 && start < length - FOOTER).then_some(start)
+    (is_footer && footer.ends_with(MAGIC) && start > 0 && start < length - FOOTER).then_some(start)
 }
 
 /// Stretches of a file one behind the other.
@@ -300,68 +244,5 @@ impl Read for Stretches {
         let read = self.file.read(&mut buffer[..most])?;
         self.left -= read as u64;
         Ok(read)
-    }
-}
-
-/// Decompresses chunks whole: they are a few megabytes long.
-struct Inflated {
-    name: &'static str,
-    inflate: fn(&[u8], &mut Vec<u8>) -> io::Result<()>,
-    out: Vec<u8>,
-    at: usize,
-}
-
-impl Inflated {
-    fn zstd() -> Self {
-        Inflated { name: "zstd", inflate: inflate_zstd, out: Vec::new(), at: 0 }
-    }
-
-    fn lz4() -> Self {
-        Inflated { name: "lz4", inflate: inflate_lz4, out: Vec::new(), at: 0 }
-    }
-}
-
-fn inflate_zstd(mut bytes: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
-    while !bytes.is_empty() && out.len() <= MAX_RECORD {
-        let left = (MAX_RECORD + 1 - out.len()) as u64;
-        let decoder = ruzstd::decoding::StreamingDecoder::new(&mut bytes).map_err(io::Error::other)?;
-        decoder.take(left).read_to_end(out)?;
-    }
-    Ok(())
-}
-
-fn inflate_lz4(bytes: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
-    lz4_flex::frame::FrameDecoder::new(bytes).take(MAX_RECORD as u64 + 1).read_to_end(out).map(|_| ())
-}
-
-impl Decompressor for Inflated {
-    fn next_read_size(&self) -> usize {
-        if self.out.is_empty() { usize::MAX } else { 0 }
-    }
-
-    fn decompress(&mut self, source: &[u8], target: &mut [u8]) -> McapResult<DecompressResult> {
-        let mut consumed = 0;
-        if self.out.is_empty() {
-            (self.inflate)(source, &mut self.out)?;
-            if self.out.len() > MAX_RECORD {
-                let reason = format!("expected a chunk of at most {MAX_RECORD} bytes, found more");
-                return Err(McapError::DecompressionError(reason));
-            }
-            consumed = source.len();
-        }
-        let wrote = target.len().min(self.out.len() - self.at);
-        target[..wrote].copy_from_slice(&self.out[self.at..self.at + wrote]);
-        self.at += wrote;
-        Ok(DecompressResult { consumed, wrote })
-    }
-
-    fn reset(&mut self) -> McapResult<()> {
-        self.out.clear();
-        self.at = 0;
-        Ok(())
-    }
-
-    fn name(&self) -> &'static str {
-        self.name
     }
 }

@@ -7,8 +7,10 @@ mod clock;
 mod definition;
 mod file;
 mod joined;
+mod json;
 mod known;
 mod mcap;
+mod mcap_records;
 mod names;
 mod rosbag;
 mod sqlite;
@@ -115,7 +117,7 @@ pub(super) fn open(
     if bag.topics.is_empty() {
         let expected = match member {
             Some(member) => format!("topics below `{member}` whose messages can be read"),
-            None => "topics whose messages can be read (`ros2msg` or `ros1msg`)".to_owned(),
+            None => "topics whose messages can be read (`ros2msg`, `ros1msg` or JSON)".to_owned(),
         };
         return Err(LogFileError::Content { file, format, expected, found: listed(&passed, 6) });
     }
@@ -253,7 +255,7 @@ impl LogSource for BagLog {
         if joined.rows == 0 {
             return Err(LogFileError::NoRows { file: self.name, line: 0 });
         }
-        let mut out = TableBuilder::new(&self.name, joined.rows, &self.options)?;
+        let mut out = TableBuilder::new(&self.name, joined.rows, self.options.read.rows, &self.options)?;
         for k in columns {
             let (values, is_time) = match k {
                 0 => (joined.stamps(choice.clock), true),

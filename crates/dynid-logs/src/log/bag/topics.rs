@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::definition::Definition;
+use super::json;
 use super::names::{Names, is_name};
 use super::walk::{Sink, walk};
 use super::wire::Wire;
@@ -16,6 +17,8 @@ const MAX_SHAPES: usize = 256;
 pub(super) enum Encoding {
     Cdr,
     Ros1,
+    /// Messages that say by themselves what they hold.
+    Json,
 }
 
 impl Encoding {
@@ -24,6 +27,7 @@ impl Encoding {
         match (message, schema) {
             ("cdr", "ros2msg") => Some(Encoding::Cdr),
             ("ros1", "ros1msg") => Some(Encoding::Ros1),
+            ("json", _) => Some(Encoding::Json),
             _ => None,
         }
     }
@@ -35,7 +39,8 @@ pub(super) struct Decoded {
     pub(super) name: String,
     pub(super) kind: String,
     encoding: Encoding,
-    definition: Definition,
+    /// What its messages hold; those in JSON have none.
+    definition: Option<Definition>,
     /// Columns of the topic.
     pub(super) columns: Vec<String>,
     places: HashMap<String, usize>,
@@ -72,7 +77,10 @@ impl Decoded {
             name: name.to_owned(),
             kind: kind.to_owned(),
             encoding,
-            definition: Definition::parse(kind, schema)?,
+            definition: match encoding {
+                Encoding::Json => None,
+                _ => Some(Definition::parse(kind, schema)?),
+            },
             columns: Vec::new(),
             places: HashMap::new(),
             shapes: HashMap::new(),
@@ -80,11 +88,18 @@ impl Decoded {
         })
     }
 
-    fn wire<'a>(&self, data: &'a [u8]) -> Result<Wire<'a>, String> {
-        match self.encoding {
-            Encoding::Cdr => Wire::cdr(data),
-            Encoding::Ros1 => Ok(Wire::ros1(data)),
-        }
+    /// Hands what a message holds to a sink.
+    fn walk(&self, data: &[u8], sink: &mut impl Sink) -> Result<(), String> {
+        let Some(definition) = &self.definition else {
+            json::walk(&json::parse(data)?, sink, true);
+            return Ok(());
+        };
+        let mut wire = match self.encoding {
+            Encoding::Cdr => Wire::cdr(data)?,
+            _ => Wire::ros1(data),
+        };
+        walk(definition, &mut wire, sink)
+            .map_err(|_| format!("expected a message of `{}`, found the end of it", self.kind))
     }
 
     /// Takes a message apart.
@@ -92,17 +107,16 @@ impl Decoded {
     /// # Errors
     /// What is wrong with it.
     pub(super) fn decode(&mut self, data: &[u8]) -> Result<Values<'_>, String> {
-        let short = |_| format!("expected a message of `{}`, found the end of it", self.kind);
-        let mut wire = self.wire(data)?;
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.numbers.clear();
         scratch.shape.clear();
         (scratch.stamp, scratch.entries) = (None, 0);
-        walk(&self.definition, &mut wire, &mut scratch).map_err(short)?;
+        let walked = self.walk(data, &mut scratch);
         self.scratch = scratch;
+        walked?;
         if !self.shapes.contains_key(&self.scratch.shape) {
             let mut names = Names::default();
-            walk(&self.definition, &mut self.wire(data)?, &mut names).map_err(short)?;
+            self.walk(data, &mut names)?;
             let columns = names.below(&self.name);
             if self.shapes.len() >= MAX_SHAPES {
                 return Err(format!(
@@ -130,6 +144,13 @@ impl Decoded {
 }
 
 impl Sink for Scratch {
+    fn key(&mut self, name: &str, kind: u8) {
+        // Behind its length: keys one after the other are no other keys.
+        self.shape.push(kind);
+        self.shape.extend((name.len() as u32).to_le_bytes());
+        self.shape.extend(name.as_bytes());
+    }
+
     fn stamp(&mut self, ns: i64) {
         self.stamp = Some(ns);
     }

@@ -4,9 +4,9 @@ use super::definition::{Count, Definition, Field, Kind, Primitive};
 use super::wire::{Short, Wire};
 
 /// Longest sequence of numbers that becomes columns; longer ones are no signals of joints.
-const LONGEST: usize = 1024;
+pub(super) const LONGEST: usize = 1024;
 /// Longest sequence of messages that becomes columns.
-const MOST_MESSAGES: usize = 256;
+pub(super) const MOST_MESSAGES: usize = 256;
 
 /// Takes what a message holds, in its order; what a sink has no use for it leaves out.
 pub(super) trait Sink {
@@ -16,6 +16,8 @@ pub(super) trait Sink {
     fn time(&mut self, ns: i64) {
         self.number(ns as f64 * 1e-9);
     }
+    /// A key that other messages of the topic need not have, or with a value of another kind.
+    fn key(&mut self, _name: &str, _kind: u8) {}
     /// A field begins.
     fn field(&mut self, _name: &str) {}
     /// One number.

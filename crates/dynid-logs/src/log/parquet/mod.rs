@@ -287,13 +287,28 @@ impl ArrayFile for Parquet {
     }
 
     fn load(&mut self, array: usize) -> Result<Values, String> {
+        self.load_rows(array, 0..self.rows.len())
+    }
+
+    fn groups(&self) -> Option<Vec<usize>> {
+        let mut start = 0;
+        let own = self.reader.metadata().row_groups().iter().map(|group| {
+            let end = start + usize::try_from(group.num_rows()).unwrap_or(0);
+            let own = self.rows.start.clamp(start, end)..self.rows.end.clamp(start, end);
+            start = end;
+            own.len()
+        });
+        Some(own.collect())
+    }
+
+    fn load_rows(&mut self, array: usize, rows: Range<usize>) -> Result<Values, String> {
         let width = self.arrays[array].shape.get(1).copied();
         let mut lists = Lists { width: Some(width.unwrap_or(1)), values: Collected::default(), rows: 0 };
         let name = &self.arrays[array].name;
-        self.walk(self.leaves[array], self.rows.clone(), &mut lists)
-            .map_err(|e| format!("column `{name}`: {e}"))?;
-        if lists.rows != self.rows.len() {
-            return Err(format!("column `{name}`: expected {} rows, found {}", self.rows.len(), lists.rows));
+        let inside = self.rows.start + rows.start..self.rows.start + rows.end;
+        self.walk(self.leaves[array], inside, &mut lists).map_err(|e| format!("column `{name}`: {e}"))?;
+        if lists.rows != rows.len() {
+            return Err(format!("column `{name}`: expected {} rows, found {}", rows.len(), lists.rows));
         }
         Ok(lists.values.finish())
     }

@@ -11,6 +11,8 @@ use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::schema::types::ColumnDescriptor;
 
+use crate::log::inflate;
+
 /// Largest page, bytes.
 const MAX_PAGE: usize = 1 << 30;
 /// The encoding of pages whose numbers are split into streams of bytes.
@@ -120,16 +122,7 @@ impl Pages {
                 out = lz4_flex::block::decompress(bytes, size).map_err(|e| wrong(e.to_string()))?;
             }
             Compression::ZSTD(_) => {
-                let mut rest = bytes;
-                while !rest.is_empty() && out.len() <= size {
-                    let left = (size + 1 - out.len()) as u64;
-                    let decoder = ruzstd::decoding::StreamingDecoder::new(&mut rest);
-                    decoder
-                        .map_err(|e| wrong(e.to_string()))?
-                        .take(left)
-                        .read_to_end(&mut out)
-                        .map_err(failed)?;
-                }
+                inflate::zstd(bytes, size, &mut out).map_err(failed)?;
             }
             other => {
                 let what = "expected pages as they are or in snappy, gzip, LZ4_RAW or zstd";
