@@ -38,7 +38,7 @@ pub struct Config {
     /// The kinds of elements that joints may have; no key: a program puts those of its own here.
     #[serde(skip)]
     pub registry: ElementRegistry,
-    /// Robot file (URDF, MJCF, SDF or TOML), relative to the configuration.
+    /// Robot file (URDF, MJCF, SDF, each as xacro too, or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-out` in the current folder.
     pub out: Option<PathBuf>,

@@ -36,7 +36,7 @@ pub fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
         joint: d.joint,
         damping: d.damping,
         friction_loss: d.friction,
-        armature: 0.0,
+        ..JointParameters::default()
     };
     Ok(urdf::dynamics(text, file)?.into_iter().map(of).collect())
 }
@@ -80,6 +80,9 @@ impl ServoResult {
     pub fn files(&self) -> Result<ServoFiles, Error> {
         let source = Source::read(&self.robot.path)?;
         let names = self.robot.rate_names();
+        // Springs were no part of the fit: they stay as they are.
+        let before = stated(&self.robot)?;
+        let spring = |name: &String| before.iter().find(|p| p.joint == *name).cloned().unwrap_or_default();
         let joints: Vec<JointParameters> = names
             .iter()
             .zip(&self.found.values.joints)
@@ -88,6 +91,7 @@ impl ServoResult {
                 damping: j.get(Term::Viscous),
                 friction_loss: j.get(Term::Coulomb),
                 armature: j.get(Term::RotorInertia),
+                ..spring(name)
             })
             .collect();
         let mut files = Vec::new();

@@ -2,6 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use dynid_files::FileMember;
 use dynid_identify::Error;
 use dynid_identify::estimate::{Estimate, Split};
 use dynid_identify::known_friction::KnownFriction;
@@ -94,7 +95,7 @@ impl Source {
     }
 
     fn of(file: RobotFile, path: &Path) -> Self {
-        Source { path: path.to_owned(), file }
+        Source { path: FileMember::of(path).path, file }
     }
 
     /// Text of the MJCF, if the robot is one.

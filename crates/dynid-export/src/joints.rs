@@ -24,7 +24,7 @@ impl Format {
 
 /// What a format states about the joints.
 pub(crate) struct JointValues {
-    /// Per joint that has friction or a rotor that the format has a place for.
+    /// Per joint that has friction, a rotor or a spring that the format has a place for.
     pub(crate) joints: Vec<JointParameters>,
     /// In words.
     pub(crate) notes: Vec<String>,
@@ -33,7 +33,7 @@ pub(crate) struct JointValues {
 /// What a format states of a model's joints.
 ///
 /// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; friction of other forms is
-/// stated as its projection (`projected`). `Ia` is armature in MJCF and has no place in URDF. Negative values, which simulators
+/// stated as its projection (`projected`). `Ia` is armature in MJCF and has no place in URDF, nor has a spring. Negative values, which simulators
 /// refuse, are stated as 0.
 pub(crate) fn split(
     identified: &Identified<'_>,
@@ -71,6 +71,12 @@ pub(crate) fn split(
             None => (state("fc", "Coulomb friction"), state("fv", "viscous friction")),
         };
         let rotor = projection.and_then(|p| p.rotor_inertia).or_else(|| state("Ia", "rotor inertia"));
+        // A file states where the spring is at rest, not the effort that it has at zero.
+        let stiffness = if format == Format::Mjcf { state("k", "stiffness of the spring") } else { None };
+        let spring_reference = match (stiffness, column("kq0")) {
+            (Some(k), Some(c)) if k > 0.0 => values[c] / k,
+            _ => 0.0,
+        };
         let armature = if format == Format::Mjcf { rotor } else { None };
         if let (Format::Urdf, Some(rotor)) = (format, rotor) {
             let unit = if joint.slides { "kg" } else { "kg m²" };
@@ -88,12 +94,14 @@ pub(crate) fn split(
                 joint.name, format.name(), p.friction_loss, units[0], p.damping, units[1], p.states
             ));
         }
-        if friction_loss.or(damping).or(armature).is_some() {
+        if friction_loss.or(damping).or(armature).or(stiffness).is_some() {
             out.joints.push(JointParameters {
                 joint: joint.name.clone(),
                 damping: damping.unwrap_or(0.0),
                 friction_loss: friction_loss.unwrap_or(0.0),
                 armature: armature.unwrap_or(0.0),
+                stiffness: stiffness.unwrap_or(0.0),
+                spring_reference,
             });
         }
     }
@@ -133,6 +141,7 @@ fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
             Some("k1" | "k2" | "d") => "elasticity",
             Some("load") => "external load",
             Some("fcp" | "fcn" | "fvp" | "fvn") => "difference of friction between the directions",
+            Some("k" | "kq0") if format == Format::Mjcf => continue,
             Some("k" | "kq0") => "spring",
             Some("ca" | "cb") => "cyclic effort",
             Some("K") => "drive gain",

@@ -58,8 +58,10 @@ impl FileModels {
         let known = |joint: &str| identified.known_friction.iter().any(|law| law.joint == joint);
         let projected = projection::project(model, values, known, &states);
         let joints = joints::split(&identified, Format::Mjcf, &projected).joints;
-        let still: Vec<JointParameters> =
-            joints.iter().map(|p| JointParameters { armature: 0.0, ..p.clone() }).collect();
+        let still: Vec<JointParameters> = joints
+            .iter()
+            .map(|p| JointParameters { armature: 0.0, stiffness: 0.0, spring_reference: 0.0, ..p.clone() })
+            .collect();
         let file = |joints: &[JointParameters]| {
             read_back::with_joints(model.mechanism().clone(), values[..10 * bodies].to_vec(), joints, model)
                 .unwrap_or_else(|fault| unreachable!("loops that closed before: {fault}"))
@@ -116,6 +118,8 @@ impl FileModels {
             friction_loss: p.friction_loss,
             damping: p.damping,
             rotor_inertia: p.armature,
+            stiffness: p.stiffness,
+            spring_reference: p.spring_reference,
         };
         ExportedRecord { joints: self.joints.iter().map(joint).collect(), projections, training, validation }
     }

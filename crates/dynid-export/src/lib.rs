@@ -6,6 +6,7 @@
 //! | viscous friction `fv` | `<dynamics damping>` | `damping` |
 //! | Coulomb friction `fc` | `<dynamics friction>` | `frictionloss` |
 //! | rotor inertia `Ia` | no place, printed | `armature` |
+//! | spring `k`, `kq0` | no place, printed | `stiffness`, `springref` |
 //! | friction of any other form, known friction | projected onto both: [`FrictionProjection`] | the same |
 //! | offset, spring, cyclic effort | no place | left out |
 //! | gravity | no place | `<option gravity>` |
@@ -219,7 +220,7 @@ impl<'a> RobotExport<'a> {
                 joint: d.joint.clone(),
                 damping: d.damping,
                 friction_loss: d.friction,
-                armature: 0.0,
+                ..JointParameters::default()
             })
             .collect();
         let mut notes = [self.notes.clone(), notes].concat();
@@ -305,12 +306,14 @@ impl<'a> RobotExport<'a> {
         let mut notes = [self.notes.clone(), notes].concat();
         let ours = |p: &&JointParameters| joints.iter().any(|j| j.joint == p.joint);
         let found: Vec<JointParameters> = read.joints.iter().filter(ours).cloned().collect();
-        let acts = |p: &JointParameters| [p.damping, p.friction_loss, p.armature].iter().any(|x| *x != 0.0);
+        let acts = |p: &JointParameters| {
+            [p.damping, p.friction_loss, p.armature, p.stiffness].iter().any(|x| *x != 0.0)
+        };
         let others = read.joints.iter().filter(|p| !ours(p) && acts(p));
         let others: Vec<&str> = others.map(|p| p.joint.as_str()).collect();
         if !others.is_empty() {
             notes.push(format!(
-                "friction and rotor not identified, left as in the file: {}",
+                "friction, rotor and spring not identified, left as in the file: {}",
                 others.join(", ")
             ));
         }

@@ -12,7 +12,10 @@ use super::read_back::{CheckStates, with_slipping_bristles};
 const MOVING_SHARE: f64 = 0.02;
 
 /// Parameters beside `fc`, `fv` (or those of both directions) that need no projection: files state them, or they are no friction.
-const STATED: [&str; 12] = ["fc", "fv", "fcp", "fcn", "fvp", "fvn", "Ia", "fo", "k1", "k2", "d", "K"];
+const STATED: [&str; 16] =
+    ["fc", "fv", "fcp", "fcn", "fvp", "fvn", "Ia", "fo", "k1", "k2", "d", "K", "k", "kq0", "ca", "cb"];
+/// Parameters whose efforts follow positions: no friction, which a projection must not take for one.
+const OF_POSITION: [&str; 7] = ["k1", "k2", "d", "k", "kq0", "ca", "cb"];
 
 /// Linear parameters of elements that act on an output with a value other than zero, by column.
 fn acting<'a>(model: &'a RobotModel, values: &'a [f64], output: usize) -> impl Iterator<Item = usize> + 'a {
@@ -105,11 +108,13 @@ fn is_coupled(model: &RobotModel, values: &[f64], output: usize) -> bool {
     acting(model, values, output).any(|c| !model.parameters().linear[c].name.starts_with(&own))
 }
 
-/// Values of the elements of an output alone: without its spring, and without its rotor unless motors are `coupled`.
+/// Values of the elements of an output alone: without what follows its position, and without its rotor unless motors are `coupled`.
 fn elements_alone(model: &RobotModel, values: &[f64], output: usize, coupled: bool) -> Vec<f64> {
-    let without: &[&str] = if coupled { &["k1", "k2", "d"] } else { &["Ia", "k1", "k2", "d"] };
+    let rubs = |c: &usize| {
+        !is_own(model, output, *c, &OF_POSITION) && (coupled || !is_own(model, output, *c, &["Ia"]))
+    };
     let mut out = vec![0.0; values.len()];
-    for c in acting(model, values, output).filter(|c| !is_own(model, output, *c, without)) {
+    for c in acting(model, values, output).filter(rubs) {
         out[c] = values[c];
     }
     out

@@ -2,7 +2,7 @@
 
 use dynid_identify::Error;
 use dynid_model::closed::ClosedMechanism;
-use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
+use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Spring, Viscous, sign};
 use dynid_model::{
     ClosedModel, Description, EffortModel, Mechanism, MotionBlock, RandomMotion, RegressorBlock, RobotModel,
     TreeModel,
@@ -131,7 +131,7 @@ pub(crate) fn compile(
     with_joints(mechanism, values, joints, like)
 }
 
-/// A model of what a file states: bodies, `joints` with friction and rotor, and the loops of the model that it is `like`.
+/// A model of what a file states: bodies, `joints` with friction, rotor and spring, and the loops of the model that it is `like`.
 ///
 /// `values`: ten inertial parameters per body. Returned with the values of the joints behind them. `Err` says which loop
 /// cannot be closed.
@@ -148,7 +148,9 @@ pub(crate) fn with_joints(
         elements.push(Box::new(Viscous { rate }));
         elements.push(Box::new(Coulomb { rate }));
         elements.push(Box::new(RotorInertia { rate }));
-        values.extend([p.damping, p.friction_loss, p.armature]);
+        elements.push(Box::new(Spring { rate }));
+        let rest = p.stiffness * p.spring_reference;
+        values.extend([p.damping, p.friction_loss, p.armature, p.stiffness, rest]);
     }
     let Some(closed) = like.closed() else {
         return Ok((RobotModel::new(mechanism, elements), values));

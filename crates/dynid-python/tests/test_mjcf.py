@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -106,6 +107,55 @@ UPPER = """<mujocoinclude>
   </body>
 </mujocoinclude>
 """
+
+
+@pytest.mark.filterwarnings("ignore::dynid.DynidWarning")
+@pytest.mark.parametrize("angle", ["degree", "radian"])
+def test_springs_are_identified_and_put_back(angle: str, tmp_path: Path) -> None:
+    """A hinge and a slide with springs that are not as the model has them: read from the file and from MuJoCo's model, and written into both."""
+    rest = "-20" if angle == "degree" else repr(float(np.radians(-20)))
+    text = f"""
+<mujoco><compiler angle="{angle}"/><worldbody><body name="a"><joint name="turn" axis="0 1 0" stiffness="5" springref="{rest}" ref="0.1"/>
+  <geom type="capsule" size=".04 .15" pos="0.1 0 .15" mass="3"/>
+  <body name="b" pos="0 0 .3"><joint name="slide" type="slide" axis="0 0 1" stiffness="40" springref="0.02" damping="1"/>
+  <geom type="box" size=".05 .04 .06" mass="1"/></body></body></worldbody></mujoco>"""
+    (tmp_path / "arm.xml").write_text(text, encoding="utf-8")
+    robot = dynid.Robot.load(tmp_path / "arm.xml")
+    assert any("spring (5 around -0.349" in w for w in robot.warnings)
+
+    def efforts(model: Any, q: Any, v: Any, a: Any) -> Any:
+        data, tau = mujoco.MjData(model), []
+        for data.qpos[:], data.qvel[:], data.qacc[:] in zip(q, v, a, strict=True):
+            mujoco.mj_inverse(model, data)
+            tau.append(data.qfrc_inverse.copy())
+        return np.array(tau)
+
+    def plain(path: Path) -> Any:
+        model = mujoco.MjModel.from_xml_path(str(path))
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        return model
+
+    real = plain(tmp_path / "arm.xml")
+    real.jnt_stiffness[:] = [8.0, 30.0]
+    real.qpos_spring[:] = [0.4, -0.05]
+    motion = dynid.simulate(robot, duration_s=30, rate_hz=200, seed=5)
+    q, v, a = motion.clean_q, motion.clean_v, motion.clean_a
+    tau = efforts(real, q, v, a)
+    for made in (robot, dynid.Robot.from_mujoco(mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml")))):
+        found = dynid.identify(made, dynid.Log(motion.t, q, tau, joints=made.joints), elements={"default": ["viscous"], "friction": "given"})
+        value = {p["name"]: p["value"] for p in json.loads(found.to_json())["parameters"]}
+        assert value["turn.k"] == pytest.approx(8.0, rel=1e-3) and value["slide.k"] == pytest.approx(30.0, rel=1e-3)
+        back = plain(tmp_path / "arm.xml")
+        found.apply(back)
+        mujoco.mj_setConst(back, mujoco.MjData(back))
+        out = tmp_path / f"{made.name}.out.xml"
+        found.to_mjcf(out)
+        ours = found.predict(q, v, a)
+        for model in (back, plain(out)) if made is robot else (back,):
+            assert model.qpos_spring == pytest.approx([0.4, -0.05], abs=2e-3)
+            theirs = efforts(model, q, v, a)
+            assert np.abs(ours - theirs).max() < 1e-12 * np.abs(theirs).max()
+            assert np.abs(tau - theirs).max() < 1e-3 * np.abs(tau).max()
 
 
 @pytest.mark.filterwarnings("ignore::dynid.DynidWarning")

@@ -92,7 +92,7 @@ def test_joints_that_were_held_are_not_counted_twice() -> None:
 
 def test_what_is_left_out_is_told() -> None:
     for change, told in (
-        ('axis="1 0 0" stiffness="3"', "`jnt_stiffness`"),
+        ('axis="1 0 0" stiffness="3 1"', "`jnt_stiffnesspoly`"),
         ('axis="1 0 0" damping="0.1 0.2"', "`dof_dampingpoly`"),
     ):
         odd = mujoco.MjModel.from_xml_string(ARM.replace('axis="1 0 0"', change, 1))

@@ -35,6 +35,9 @@ pub const LOAD: &str = "load";
 
 /// Elements of a joint about which nothing is said.
 pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
+/// A spring between the bodies that a joint joins, and a constant effort.
+const SPRING: &str = "spring";
+const OFFSET: &str = "offset";
 
 /// Which elements act at which joints of a mechanism, by name.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +76,8 @@ pub struct ElementPlan {
 impl ElementPlan {
     /// Elements as the robot file (or the configuration) says; joints and motors about which nothing is said get
     /// [`DEFAULTS`] if they move, joints behind a spring without `rotor`: theirs turns with the motor; joints with clearance without
-    /// `coulomb`: the friction of their bearings has a law of its own.
+    /// `coulomb`: the friction of their bearings has a law of its own. A spring that the file of another format states comes beside the defaults, in
+    /// place of `offset`.
     ///
     /// `moves`: whether the logs move the joint of each rate.
     ///
@@ -128,9 +132,17 @@ impl ElementPlan {
                 None if moves(rate) => {
                     let behind = spec.elastic.iter().any(|e| e.joint == *name);
                     let rubs = spec.clearance.iter().any(|c| c.joint == *name);
-                    let left_out =
-                        |d: &str| (behind && d == elastic::ROTOR) || (rubs && d == journals::COULOMB);
-                    defaults.iter().filter(|d| !left_out(d)).cloned().collect()
+                    let beside: Vec<&String> =
+                        spec.beside.iter().filter(|(joint, _)| joint == name).map(|(_, e)| e).collect();
+                    // A constant effort is the same as another rest position of a spring.
+                    let springs = beside.iter().any(|e| *e == SPRING);
+                    let left_out = |d: &str| {
+                        (behind && d == elastic::ROTOR)
+                            || (rubs && d == journals::COULOMB)
+                            || (springs && d == OFFSET)
+                    };
+                    let own = defaults.iter().filter(|d| !left_out(d) && !beside.contains(d));
+                    own.chain(beside.iter().copied()).cloned().collect()
                 }
                 None => Vec::new(),
             };

@@ -573,7 +573,7 @@ fn setting_hint(name: &str) -> Option<&'static str> {
         "log" => {
             "`[[log]]` with `path = \"log.csv\"`; in the library `log: vec![LogConfig { path, ..LogConfig::default() }]`"
         }
-        "robot" => "`robot = \"robot.urdf\"`, a URDF, an MJCF, an SDF or a robot in TOML",
+        "robot" => "`robot = \"robot.urdf\"`, a URDF, an MJCF, an SDF, each as xacro too, or a robot in TOML",
         "bound" => {
             "for example `links = [\"forearm\"]`, `mass = [0.5, 2.0]`; one entry of [[bound]] for each subject"
         }

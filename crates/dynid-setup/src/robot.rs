@@ -62,7 +62,7 @@ impl Robot {
         Self::of_file(path, dynid_robots::robot::read(path)?, options)
     }
 
-    /// Reads a robot from the text of a URDF, MJCF, SDF or TOML file; `path` says which by its ending, and stands in messages and provenance.
+    /// Reads a robot from the text of a URDF, MJCF, SDF, xacro or TOML file; `path` says which by its ending, and stands in messages and provenance.
     ///
     /// # Errors
     /// Fails as [`Robot::load`] does.

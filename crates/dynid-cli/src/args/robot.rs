@@ -7,7 +7,7 @@ use clap::{Args, ValueHint};
 /// How a robot file is read.
 #[derive(Debug, Args)]
 pub(crate) struct RobotArgs {
-    /// Robot file: URDF, MJCF, SDF, or TOML with DH rows or bodies; `-`: standard input.
+    /// Robot file: URDF, MJCF, SDF, each as xacro too (`FILE#name:=value`), or TOML with DH rows or bodies; `-`: standard input.
     #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) robot: PathBuf,
     /// Put a floating joint under the root link.

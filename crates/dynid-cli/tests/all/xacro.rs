@@ -42,6 +42,12 @@ fn a_robot_in_xacro_goes_through_the_commands() {
     );
     run(at, &["identify", robot, "--log", "log.csv", "--out", "out", "--quiet"], 0);
     run(at, &["export", "out/estimate.json", "--mjcf", "arm.xml"], 0);
+    run(at, &["diff", robot, "out/estimate.json"], 0);
+    run(at, &["check", "log.csv", "--robot", robot], 0);
+    run(at, &["init", robot, "log.csv", "--out", "run.toml"], 0);
+    assert!(
+        fs::read_to_string(at.join("run.toml")).unwrap().contains("robot = \"arm.urdf.xacro#prefix:=left_\"")
+    );
 
     let estimate: Value =
         serde_json::from_str(&fs::read_to_string(at.join("out/estimate.json")).unwrap()).unwrap();

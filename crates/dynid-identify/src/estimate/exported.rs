@@ -31,6 +31,12 @@ pub struct ExportedJoint {
     pub damping: f64,
     /// MJCF `armature`, kg m² or kg; URDF has no place for it.
     pub rotor_inertia: f64,
+    /// MJCF `stiffness`, N m/rad or N/m; URDF has no place for it.
+    #[serde(default)]
+    pub stiffness: f64,
+    /// MJCF `springref`, rad or m; 0 without a spring.
+    #[serde(default)]
+    pub spring_reference: f64,
 }
 
 /// What files predict on a log.

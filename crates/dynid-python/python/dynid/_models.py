@@ -84,10 +84,13 @@ class _Text:
             self.massless.append(name)
         self.lines.append(f"phi = {_numbers(phi if phi is not None else [0.0] * 10)}")
 
-    def joint_values(self, joint: str, *, rotor: float, damping: float, friction: float) -> None:
+    def joint_values(self, joint: str, *, rotor: float, damping: float, friction: float, spring: tuple[float, float] = (0.0, 0.0)) -> None:
         """States what a model says of a joint, for simulations and as what is thought beforehand."""
         stated = {"rotor = { inertia": rotor, "viscous = { coefficient": damping, "coulomb = { effort": friction}
         lines = [f"{key} = {_number(value)} }}" for key, value in stated.items() if value > 0]
+        stiffness, rest = spring
+        if stiffness > 0:
+            lines += ['beside = ["spring"]', f"spring = {{ stiffness = {_number(stiffness)}, kq0 = {_number(stiffness * rest)} }}"]
         if lines:
             self.elements += ["", f"[element.{json.dumps(joint)}]", *lines]
 
@@ -206,8 +209,9 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             if kind not in (2, 3):
                 what = "free" if kind == 0 else "ball"
                 raise fault(
-                UnsupportedError,
-                    f"joint `{joint}` of body `{names[b]}` is a {what} joint", "a fixed base, and joints that turn or slide, can be identified"
+                    UnsupportedError,
+                    f"joint `{joint}` of body `{names[b]}` is a {what} joint",
+                    "a fixed base, and joints that turn or slide, can be identified",
                 )
             anchor, axis = np.array(model.jnt_pos[j]), np.array(model.jnt_axis[j])
             zero = float(model.qpos0[model.jnt_qposadr[j]])
@@ -226,10 +230,14 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             text.body(link, parent, joint, "revolute" if kind == 3 else "prismatic", (turned, at), axis=axis, limits=bounds, phi=phi)
             d = int(model.jnt_dofadr[j])
             text.joint_values(
-                joint, rotor=float(model.dof_armature[d]), damping=float(model.dof_damping[d]), friction=float(model.dof_frictionloss[d])
+                joint,
+                rotor=float(model.dof_armature[d]),
+                damping=float(model.dof_damping[d]),
+                friction=float(model.dof_frictionloss[d]),
+                spring=(float(model.jnt_stiffness[j]), float(model.qpos_spring[model.jnt_qposadr[j]])),
             )
             # Later versions have polynomials beside the linear terms.
-            for what in ("jnt_stiffness", "jnt_stiffnesspoly", "dof_dampingpoly"):
+            for what in ("jnt_stiffnesspoly", "dof_dampingpoly"):
                 if np.any(getattr(model, what, np.zeros(model.nv))[d if what.startswith("dof") else j]):
                     text.warnings.append(f"joint `{joint}`: its `{what}` is left out")
             parent, last = link, anchor
@@ -281,7 +289,9 @@ def _none_held(known: Sequence[str], joints: Mapping[str, Any]) -> None:
     held = [name for name in known if name not in joints]
     if held:
         # Their links are part of the body that carried them, and would count twice.
-        raise fault(UnsupportedError, f"joints {', '.join(held)} of the model were held in the identification", "log them, or export: `to_urdf`, `to_mjcf`")
+        raise fault(
+            UnsupportedError, f"joints {', '.join(held)} of the model were held in the identification", "log them, or export: `to_urdf`, `to_mjcf`"
+        )
 
 
 def _missing(kind: str, known: Sequence[str], wanted: Mapping[str, Any]) -> None:
@@ -318,6 +328,9 @@ def _apply_mujoco(bodies: Mapping[str, Vector], joints: Mapping[str, Any], model
         model.dof_armature[d] = values["rotor_inertia"]
         model.dof_damping[d] = values["damping"]
         model.dof_frictionloss[d] = values["friction_loss"]
+        model.jnt_stiffness[all_joints[name]] = values["stiffness"]
+        if values["stiffness"] > 0:
+            model.qpos_spring[model.jnt_qposadr[all_joints[name]]] = values["spring_reference"]
         if hasattr(model, "dof_dampingpoly"):
             # The damping that was found stands for all of it.
             model.dof_dampingpoly[d] = 0

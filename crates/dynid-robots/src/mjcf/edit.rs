@@ -23,7 +23,7 @@ use crate::urdf::inertial::Inertial;
 /// there.
 /// Where `<compiler>` would make something else of stated inertias (`inertiafromgeom="true"`, `balanceinertia`, bounds, a total
 /// mass), these attributes are set to what leaves them alone, and every body that moves states its inertia. A massless link between the
-/// joints of one body has no element and is left as it is. `joints`: `damping`, `frictionloss` and `armature` are set where they differ
+/// joints of one body has no element and is left as it is. `joints`: `damping`, `frictionloss`, `armature`, `stiffness` and `springref` are set where they differ
 /// from what the joint has already, other attributes are kept. Everything else is byte for byte the input.
 ///
 /// # Errors
@@ -129,7 +129,7 @@ impl<'a> Editor<'a> {
         Ok(())
     }
 
-    /// Friction and rotor of a joint.
+    /// Friction, rotor and spring of a joint.
     fn joint(
         &mut self,
         path: &Path,
@@ -148,6 +148,8 @@ impl<'a> Editor<'a> {
             ("damping", wanted.damping, found.damping),
             ("frictionloss", wanted.friction_loss, found.friction_loss),
             ("armature", wanted.armature, found.armature),
+            ("stiffness", wanted.stiffness, found.stiffness),
+            ("springref", wanted.spring_reference / part.unit, found.spring_reference / part.unit),
         ];
         let mut added = String::new();
         for (key, value, before) in values {

@@ -20,8 +20,8 @@ pub(super) struct MovingJoint {
     pub(super) limits: Limits,
     /// Friction and rotor; its name is still to be given.
     pub(super) parameters: JointParameters,
-    /// Stiffness and rest position of its spring, if it has one.
-    pub(super) spring: Option<(f64, f64)>,
+    /// Radians, or metres, of the numbers of its element.
+    pub(super) unit: f64,
 }
 
 /// What a joint element is.
@@ -78,6 +78,9 @@ pub(super) fn read(
         return Err(fields.refuse("springdamper", reason, "state `stiffness` and `damping`"));
     }
     let parameter = |key: &str| fields.not_negative(key, fields.number(key, 0.0)?);
+    let stiffness = fields.not_negative("stiffness", fields.linear("stiffness")?)?;
+    let stiffness = if options.springs { stiffness } else { 0.0 };
+    let reference = unit(fields.number("springref", 0.0)?);
     let parameters = JointParameters {
         joint: String::new(),
         damping: if options.dampers {
@@ -87,9 +90,9 @@ pub(super) fn read(
         },
         friction_loss: if options.friction { parameter("frictionloss")? } else { 0.0 },
         armature: parameter("armature")?,
+        stiffness,
+        spring_reference: if stiffness > 0.0 { reference } else { 0.0 },
     };
-    let stiffness = fields.not_negative("stiffness", fields.linear("stiffness")?)?;
-    let rest = unit(fields.number("springref", 0.0)?);
     Ok(JointElement::Moving(MovingJoint {
         kind,
         anchor: frame.rotation.mul_vec(fields.vector("pos")?) + frame.translation,
@@ -97,7 +100,7 @@ pub(super) fn read(
         zero: unit(fields.number("ref", 0.0)?),
         limits: Limits { position, velocity: None, effort },
         parameters,
-        spring: (options.springs && stiffness > 0.0).then_some((stiffness, rest)),
+        unit: unit(1.0),
     }))
 }
 

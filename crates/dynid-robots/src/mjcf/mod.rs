@@ -38,8 +38,8 @@ const SOLID: &str =
 /// What helps with a constraint.
 const REMOVE_OR_DISABLE: &str = "remove it, or write active=\"false\"";
 
-/// What a joint of MJCF states about dissipation and rotor, all of it on the drive's side of the effort:
-/// `armature · q̈ + damping · q̇ + frictionloss · sign(q̇)`.
+/// What a joint of MJCF states about dissipation, rotor and spring, all of it on the drive's side of the effort:
+/// `armature · q̈ + damping · q̇ + frictionloss · sign(q̇) + stiffness · (q - springref)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointParameters {
     /// Joint.
@@ -50,6 +50,10 @@ pub struct JointParameters {
     pub friction_loss: f64,
     /// Rotor inertia behind the gear `armature`, kg m² or kg.
     pub armature: f64,
+    /// Stiffness of a spring between the bodies `stiffness`, N m/rad or N/m.
+    pub stiffness: f64,
+    /// Position at which that spring is at rest `springref`, rad or m; 0 without a spring.
+    pub spring_reference: f64,
 }
 
 /// A name as it stands between the quotes of an attribute.

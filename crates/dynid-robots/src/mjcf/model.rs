@@ -33,6 +33,8 @@ pub(super) struct JointPart<'a> {
     pub(super) parameters: JointParameters,
     /// Its position where the body is as drawn.
     pub(super) zero: f64,
+    /// Radians, or metres, of the numbers of its element.
+    pub(super) unit: f64,
     pub(super) copied: bool,
 }
 

@@ -39,7 +39,8 @@ pub struct MjcfRobot {
 /// - Frames, copies (`<replicate>`), classes of `<default>` and included files are resolved, and orientations in all ways of MJCF.
 /// - Inertia: `<inertial>`, or the shapes (`inertiafromgeom`): spheres, capsules, cylinders, ellipsoids, boxes, and meshes (STL, OBJ) of
 ///   `inertia` legacy, exact or shell; the bounds and the total mass of `<compiler>`. Shapes of bodies that stand still are not weighed.
-/// - `armature`, `damping` and `frictionloss` are stated values of the elements `rotor`, `viscous` and `coulomb`.
+/// - `armature`, `damping` and `frictionloss` are stated values of the elements `rotor`, `viscous` and `coulomb`; `stiffness` and `springref` are the
+///   element `spring` of the joint, with its values.
 /// - Efforts are limited by `actuatorfrcrange`, or by the `forcerange` of an actuator (of a motor also its `ctrlrange`) times its gear.
 /// - `<equality>`: linear `<joint>` is a mimic joint, `<connect>` a spherical and `<weld>` a fixed loop.
 ///

@@ -245,12 +245,22 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
     /// What a joint states of friction, rotor and spring.
     fn state(&mut self, name: &str, moving: &MovingJoint, stated: &NamedJoint<'a>) {
         let parameters = JointParameters { joint: name.to_owned(), ..moving.parameters.clone() };
+        let rest = parameters.stiffness * parameters.spring_reference;
         let values = [
             ("rotor", "inertia", parameters.armature),
             ("viscous", "coefficient", parameters.damping),
             ("coulomb", "effort", parameters.friction_loss),
+            ("spring", "stiffness", parameters.stiffness),
+            ("spring", "kq0", rest),
         ];
-        for (element, key, value) in values.into_iter().filter(|(.., value)| *value > 0.0) {
+        if parameters.stiffness > 0.0 {
+            self.model.elements.beside.push((name.to_owned(), "spring".to_owned()));
+            self.model.warnings.push(format!(
+                "joint `{name}`: its spring ({} around {}) is its element `spring`, which is identified; rigid bodies alone and drives do not have it",
+                parameters.stiffness, parameters.spring_reference
+            ));
+        }
+        for (element, key, value) in values.into_iter().filter(|(.., value)| *value != 0.0) {
             self.model.elements.settings.push(ElementSetting {
                 joint: name.to_owned(),
                 element: element.to_owned(),
@@ -258,15 +268,11 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
                 value: SettingValue::Number(value),
             });
         }
-        if let Some((stiffness, rest)) = moving.spring {
-            self.model.warnings.push(format!(
-                "joint `{name}`: its spring ({stiffness} around {rest}) is no part of the rigid model: give the joint the element `spring`"
-            ));
-        }
         self.model.joints.push(JointPart {
             element: stated.fields.element,
             parameters,
             zero: moving.zero,
+            unit: moving.unit,
             copied: stated.copied,
         });
     }

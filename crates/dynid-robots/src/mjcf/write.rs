@@ -21,8 +21,8 @@ use crate::urdf::inertial::Inertial;
 /// - `<inertial>`: centre of mass and `fullinertia` about it (order xx yy zz xy xz yz) in link axes; none for massless
 ///   links, and none for links that do not move if no body could have the stated one (MuJoCo would refuse the file).
 /// - Joints: `hinge` (revolute, continuous), `slide` (prismatic), `freejoint`; `ref` is 0, so `qpos` is the position of
-///   the description. `range` from the limits of revolute and prismatic joints, `damping`, `frictionloss`, `armature`
-///   from `joints` (joints that are not named there: 0).
+///   the description. `range` from the limits of revolute and prismatic joints, `damping`, `frictionloss`, `armature`,
+///   `stiffness`, `springref` from `joints` (joints that are not named there: 0).
 /// - A mimic joint follows its leader by `<equality><joint polycoef="offset ratio 0 0 0"/>`.
 /// - One `<motor>` of gear 1 per joint under the joint's name, its `ctrlrange` the limit of the effort; none for mimic
 ///   joints if the description couples them.
@@ -287,8 +287,13 @@ impl<'a> Writer<'a> {
             let _ = write!(out, " range=\"{low:?} {high:?}\"");
         }
         if let Some(p) = self.parameters.get(joint.name.as_str()) {
-            let entries =
-                [("damping", p.damping), ("frictionloss", p.friction_loss), ("armature", p.armature)];
+            let entries = [
+                ("damping", p.damping),
+                ("frictionloss", p.friction_loss),
+                ("armature", p.armature),
+                ("stiffness", p.stiffness),
+                ("springref", p.spring_reference),
+            ];
             for (key, value) in entries {
                 if !value.is_finite() {
                     return refuse(&format!("{key} is not finite"));

@@ -315,10 +315,14 @@ impl Reader<'_> {
                 })?;
             }
             let stated = joint::read(self.document, self.frames, joint, (&name, place), self.version)?;
-            for (element, key, value) in
-                [("viscous", "coefficient", stated.damping), ("coulomb", "effort", stated.friction)]
-            {
-                if value > 0.0 {
+            let (stiffness, rest) = stated.spring.unwrap_or_default();
+            for (element, key, value) in [
+                ("viscous", "coefficient", stated.damping),
+                ("coulomb", "effort", stated.friction),
+                ("spring", "stiffness", stiffness),
+                ("spring", "kq0", stiffness * rest),
+            ] {
+                if value != 0.0 {
                     self.elements.settings.push(ElementSetting {
                         joint: name.clone(),
                         element: element.to_owned(),
@@ -328,8 +332,9 @@ impl Reader<'_> {
                 }
             }
             if let Some((stiffness, rest)) = stated.spring {
+                self.elements.beside.push((name.clone(), "spring".to_owned()));
                 self.warnings.push(format!(
-                    "{owner}: its spring ({stiffness} around {rest}) is no part of the rigid model: give the joint the element `spring`"
+                    "{owner}: its spring ({stiffness} around {rest}) is its element `spring`, which is identified; rigid bodies alone and drives do not have it"
                 ));
             }
             if stated.one_end {

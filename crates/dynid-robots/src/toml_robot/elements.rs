@@ -16,6 +16,10 @@ use super::schema::{CouplingForm, RobotToml};
 use crate::robot_error::RobotFileError;
 use crate::tie::TieSpec;
 
+/// All elements of a joint, and those that it has beside the defaults.
+const LIST: &str = "elements";
+const BESIDE: &str = "beside";
+
 /// Elements, their settings, and transmissions that couple joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ElementSpec {
@@ -23,6 +27,9 @@ pub struct ElementSpec {
     pub defaults: Vec<String>,
     /// Elements of single joints in place of the defaults: `[element.<joint>] elements`.
     pub per_joint: Vec<(String, Vec<String>)>,
+    /// Elements of joints that have no list of their own, beside the defaults: `[element.<joint>] beside`, and springs that an MJCF or an SDF
+    /// states.
+    pub beside: Vec<(String, String)>,
     /// Settings of elements: the other keys of `[element.<joint>]`.
     pub settings: Vec<ElementSetting>,
     /// Couplings: `[[coupling]]`.
@@ -127,13 +134,21 @@ pub(super) fn build(
                 let plain = plain.map(|(key, value)| (key.clone(), value.clone())).collect();
                 let mut path = Path { source, offset, joint, element, out: &mut spec.settings };
                 path.flatten("", &Value::Table(plain))?;
-            } else if element == "elements" {
+            } else if element == LIST || element == BESIDE {
+                if element == BESIDE && table.get_ref().contains_key(LIST) {
+                    let owner = format!("element.{joint}");
+                    let expected = "no list of all elements of the joint beside it";
+                    return Err(source.value(offset, &owner, BESIDE, expected, "`elements`"));
+                }
                 let list = value.as_array().and_then(|a| texts(a));
                 let list = list.ok_or_else(|| {
                     let owner = format!("element.{joint}");
-                    source.value(offset, &owner, "elements", "a list of names", &value.to_string())
+                    source.value(offset, &owner, element, "a list of names", &value.to_string())
                 })?;
-                spec.per_joint.push((joint.clone(), list));
+                match element.as_str() {
+                    BESIDE => spec.beside.extend(list.into_iter().map(|name| (joint.clone(), name))),
+                    _ => spec.per_joint.push((joint.clone(), list)),
+                }
             } else {
                 let mut path = Path { source, offset, joint, element, out: &mut spec.settings };
                 path.flatten("", value)?;

@@ -23,7 +23,7 @@ pub(super) struct Block {
 }
 
 /// How a parameter of a macro gets a value where none is stated.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Default {
     /// From the property of the same name around the call.
     pub(super) forwarded: bool,

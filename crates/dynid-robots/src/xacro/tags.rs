@@ -443,17 +443,13 @@ fn value_end(text: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::parameters;
+    use super::{Default, parameters};
 
     #[test]
     fn parameters_have_defaults_and_blocks() {
-        let own: Vec<(String, Option<(bool, Option<String>)>)> =
-            parameters("a b:=1 c:='x y' d:=^ e:=^|2 f:=${x * 2}\n  *origin **content g = 3 h:=")
-                .into_iter()
-                .map(|(name, default)| (name, default.map(|d| (d.forwarded, d.text))))
-                .collect();
+        let own = parameters("a b:=1 c:='x y' d:=^ e:=^|2 f:=${x * 2}\n  *origin **content g = 3 h:=");
         let with = |name: &str, forwarded: bool, text: Option<&str>| {
-            (name.to_owned(), Some((forwarded, text.map(str::to_owned))))
+            (name.to_owned(), Some(Default { forwarded, text: text.map(str::to_owned) }))
         };
         let without = |name: &str| (name.to_owned(), None);
         assert_eq!(

@@ -70,7 +70,14 @@ fn a_tree_with_welded_links_and_awkward_names_reads_back() {
     let mut d = urdf::parse(TREE, "tree").unwrap();
     d.gravity = [0.1, -2.0, 9.0];
     let parameters = [
-        JointParameters { joint: "j \"1\"".into(), damping: 0.3, friction_loss: 1e-9, armature: 1.0 / 3.0 },
+        JointParameters {
+            joint: "j \"1\"".into(),
+            damping: 0.3,
+            friction_loss: 1e-9,
+            armature: 1.0 / 3.0,
+            stiffness: 2.5,
+            spring_reference: -0.1,
+        },
         JointParameters { joint: "slide".into(), damping: 7.0, ..JointParameters::default() },
     ];
     for coupled in [false, true] {

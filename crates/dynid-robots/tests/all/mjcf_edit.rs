@@ -51,9 +51,27 @@ fn all_but_what_is_set_stays_byte_for_byte() {
         ("tool".to_owned(), Inertia::default()),
     ];
     let joints = [
-        JointParameters { joint: "a".into(), damping: 0.5, friction_loss: 0.25, armature: 0.1 },
-        JointParameters { joint: "b".into(), damping: 0.0, friction_loss: 0.0, armature: 0.75 },
-        JointParameters { joint: "c".into(), damping: 0.0, friction_loss: 3.0, armature: 0.0 },
+        JointParameters {
+            joint: "a".into(),
+            damping: 0.5,
+            friction_loss: 0.25,
+            armature: 0.1,
+            ..JointParameters::default()
+        },
+        JointParameters {
+            joint: "b".into(),
+            damping: 0.0,
+            friction_loss: 0.0,
+            armature: 0.75,
+            ..JointParameters::default()
+        },
+        JointParameters {
+            joint: "c".into(),
+            damping: 0.0,
+            friction_loss: 3.0,
+            armature: 0.0,
+            ..JointParameters::default()
+        },
     ];
     let files = mjcf::edit(ARM, "m.xml".as_ref(), &links, &joints).unwrap();
     let text = &files[0].text;

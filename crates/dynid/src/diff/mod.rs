@@ -14,6 +14,7 @@ mod structure;
 
 use std::path::Path;
 
+use dynid_files::FileMember;
 use dynid_logs::{ReadOptions, States};
 use dynid_model::{EffortModel, Parameter, RobotModel};
 
@@ -40,8 +41,8 @@ impl Side {
     /// # Errors
     /// As [`Estimate::read`] and [`dynid_robots::robot::read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            dynid_files::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text = dynid_files::input::read(&FileMember::of(path).path)
+            .map_err(|source| Error::Read { file: path.to_owned(), source })?;
         match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
             Some(b'{') => Ok(Side::Estimate(Box::new(Estimate::read(path)?))),
             _ => Ok(Side::Robot(Box::new(StatedRobot::read(path)?))),

@@ -8,7 +8,9 @@ use dynid::export::{
     CheckStates, ExportError, Exported, Identified, READ_BACK_LIMIT, RobotExport, RobotJson, Source, json,
 };
 use dynid::io::{mjcf, urdf};
-use dynid::model::element::{AsymmetricFriction, Coulomb, JointElement, Offset, RotorInertia, Viscous};
+use dynid::model::element::{
+    AsymmetricFriction, Coulomb, JointElement, Offset, RotorInertia, Spring, Viscous,
+};
 use dynid::model::{Description, EffortModel, Inertia, Mat3, RobotModel, Vec3};
 use tempfile::TempDir;
 
@@ -239,6 +241,28 @@ fn negative_friction_and_rotors_are_written_as_zero_and_said() {
     let text = json(&case.identified(), &CheckStates::random(&case.model)).unwrap().text;
     let robot: RobotJson = serde_json::from_str(&text).unwrap();
     assert_eq!(robot.joints[0].viscous, Some(-1.25));
+}
+
+/// What follows the position is no friction: the springs go where they have a place, friction stays what was identified.
+#[test]
+fn springs_have_a_place_in_mjcf_and_none_in_friction() {
+    let of_joint = |rate: usize| -> Vec<Box<dyn JointElement>> {
+        vec![Box::new(Coulomb { rate }), Box::new(Viscous { rate }), Box::new(Spring { rate })]
+    };
+    let values = [0.4, 0.2, 8.0, 3.2, 0.5, 0.1, 30.0, -1.5];
+    let case = Case::new(ARM, [of_joint(0), of_joint(1)].into_iter().flatten().collect(), &values);
+    let [urdf, mjcf] = case.both();
+    let read = mjcf::parse(&mjcf.text, "m.xml").unwrap().joints;
+    for (p, expected) in read.iter().zip([(0.4, 0.2, 8.0, 0.4), (0.5, 0.1, 30.0, -0.05)]) {
+        assert_eq!((p.friction_loss, p.damping, p.stiffness, p.spring_reference), expected, "{p:?}");
+    }
+    assert!(
+        mjcf.notes.iter().all(|note| !note.contains("spring") && !note.contains("friction")),
+        "{:?}",
+        mjcf.notes
+    );
+    assert!(urdf.text.contains("<dynamics damping=\"0.2\" friction=\"0.4\"/>"), "{}", urdf.text);
+    assert!(urdf.notes.iter().any(|note| note.contains("spring of shoulder, elbow")), "{:?}", urdf.notes);
 }
 
 #[test]

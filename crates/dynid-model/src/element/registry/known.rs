@@ -80,7 +80,8 @@ fn others() -> Vec<ElementKind> {
             |p| Ok(Box::new(Spring { rate: p.rate })),
         )
         .equation("k (q - q0)")
-        .help("`kq0 = k q0`"),
+        .help("`kq0 = k q0`")
+        .keys(&["stiffness", "kq0"]),
         ElementKind { shape: vec![Cyclic::TORQUE_CYCLES], ..cyclic }
             .equation("ca cos(n q) + cb sin(n q)")
             .help("torque ripple: `n` repetitions per turn, set by `cyclic = { cycles = n }`"),

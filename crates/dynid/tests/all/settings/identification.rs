@@ -920,7 +920,8 @@ fn settings_of_elements_that_nothing_reads_are_refused() {
         ("stribeck = { vss = 0.1 }", "vss"),
         ("rotor = { inertia = true }", "expected a number"),
         ("cyclic = { cycle = 3 }", "`cycles`"),
-        ("spring = { k = 3 }", "no settings"),
+        ("spring = { k = 3 }", "`stiffness`"),
+        ("drive_gain = { k = 3 }", "no settings"),
         ("external_load = { brake = 1 }", "true or false"),
     ];
     for (slip, words) in slips {
