@@ -39,7 +39,11 @@ class Expressions:
     def value(self, depth: int) -> str:
         if depth == 0:
             return self.number()
-        a, b, c = (lambda: self.value(depth - 1) for _ in range(3))
+
+        def a() -> str:
+            return self.value(depth - 1)
+
+        b = c = a
         kind = self.rng.integers(13)
         if kind < 4:
             return f"{a()} {self.of('+', '-', '*', '/', '//', '%')} {b()}"
@@ -106,7 +110,10 @@ def test_expressions_have_the_values_of_python(tmp_path: Path) -> None:
 def arm(seed: int) -> str:
     """An arm of macros: parameters with defaults, blocks, conditions, properties that wait, lists and dictionaries."""
     rng = np.random.default_rng(seed)
-    number = lambda: repr(float(rng.uniform(0.1, 2.0)))  # noqa: E731
+
+    def number() -> str:
+        return repr(float(rng.uniform(0.1, 2.0)))
+
     calls = "".join(
         f'<xacro:link_and_joint n="{k}" mass="{number()}" {f"size={chr(34)}{number()}{chr(34)}" if rng.random() < 0.5 else ""}>'
         f'<origin xyz="${{side * {number()}}} {number()} ${{size}}" rpy="0 ${{radians({rng.integers(-90, 90)})}} 0"/>'
