@@ -346,11 +346,8 @@ struct ArrayBlocks {
 impl ArrayBlocks {
     /// Loads the next rows behind those that were not given yet.
     fn load(&mut self, part: Range<usize>) -> Result<(), LogFileError> {
-        let rows = Some((part.start + 1, part.end));
-        let mut builder = TableBuilder::new(&self.log.file, self.log.rows, rows, &self.log.options)?;
-        // What is loaded begins with these rows.
-        builder.skipped = 0;
-        builder.origins = self.loaded.as_ref().map(|(table, _)| table.origin.clone());
+        let origins = self.loaded.as_ref().map(|(table, _)| table.origin.clone());
+        let builder = TableBuilder::of_part(&self.log.file, part.clone(), origins, &self.log.options)?;
         let mut more = self.log.table(builder, &self.columns, &self.times, self.missing, Some(part))?;
         if let Some((before, given)) = self.loaded.take() {
             more.rows += before.rows - given;
@@ -407,7 +404,7 @@ impl TableBuilder {
     ///
     /// # Errors
     /// [`LogFileError::RowRange`]: the log does not have these rows.
-    fn rows_of(
+    pub(super) fn rows_of(
         file: &str,
         rows: usize,
         wanted: Option<(usize, usize)>,
@@ -442,6 +439,21 @@ impl TableBuilder {
         };
         let max_magnitude = options.read.max_magnitude;
         Ok(TableBuilder { table, skipped: first - 1, origins: None, max_magnitude })
+    }
+
+    /// Rows of a table whose numbers are handed over without those before them. `origins`: what is taken from long stamps, where rows before
+    /// these said it.
+    ///
+    /// # Errors
+    /// As [`TableBuilder::rows_of`].
+    pub(super) fn of_part(
+        file: &str,
+        part: Range<usize>,
+        origins: Option<Vec<i64>>,
+        options: &LogOptions,
+    ) -> Result<Self, LogFileError> {
+        let whole = TableBuilder::new(file, part.end, Some((part.start + 1, part.end)), options)?;
+        Ok(TableBuilder { skipped: 0, origins, ..whole })
     }
 
     /// Adds a column; of its numbers, row `k` has that at `first + k * step`.

@@ -23,6 +23,33 @@ pub(super) struct Times {
     pub(super) receipt: Vec<i64>,
 }
 
+/// Stamps that are collected one by one without more memory than they take in the end: a list that grows holds them twice while it moves.
+#[derive(Debug, Default)]
+pub(super) struct Stamps(Vec<Vec<i64>>);
+
+impl Stamps {
+    /// Stamps that lie together.
+    const TOGETHER: usize = 1 << 16;
+
+    pub(super) fn push(&mut self, stamp: i64) {
+        match self.0.last_mut().filter(|last| last.len() < Self::TOGETHER) {
+            Some(last) => last.push(stamp),
+            None => {
+                let mut next = Vec::with_capacity(Self::TOGETHER);
+                next.push(stamp);
+                self.0.push(next);
+            }
+        }
+    }
+
+    pub(super) fn finish(self) -> Vec<i64> {
+        let mut all = Vec::with_capacity(self.0.iter().map(Vec::len).sum());
+        // Each part is given back once it has been moved.
+        self.0.into_iter().for_each(|part| all.extend(part));
+        all
+    }
+}
+
 impl Times {
     pub(super) fn of(&self, clock: Clock) -> &[i64] {
         match clock {
@@ -49,15 +76,19 @@ pub(super) struct Steps {
 
 impl Steps {
     pub(super) fn of(stamps: &[i64]) -> Option<Self> {
-        let steps: Vec<i64> = stamps.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
-        let mut sorted = steps.clone();
-        sorted.sort_unstable();
-        let usual = *sorted.get(sorted.len() / 2)? as f64;
-        let near: Vec<f64> =
-            steps.iter().map(|s| *s as f64).filter(|s| s.abs() <= 10.0 * usual.max(1.0)).collect();
-        let squares: f64 = near.iter().map(|s| (s - usual) * (s - usual)).sum();
-        let jitter = (squares / near.len().max(1) as f64).sqrt();
-        Some(Steps { usual, jitter, out_of_order: steps.iter().filter(|s| **s <= 0).count() })
+        let steps = || stamps.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+        // One list of them at a time: logs may be long.
+        let mut all: Vec<i64> = steps().collect();
+        if all.is_empty() {
+            return None;
+        }
+        let middle = all.len() / 2;
+        let usual = *all.select_nth_unstable(middle).1 as f64;
+        drop(all);
+        let near = || steps().map(|s| s as f64).filter(|s| s.abs() <= 10.0 * usual.max(1.0));
+        let squares: f64 = near().map(|s| (s - usual) * (s - usual)).sum();
+        let jitter = (squares / near().count().max(1) as f64).sqrt();
+        Some(Steps { usual, jitter, out_of_order: steps().filter(|s| *s <= 0).count() })
     }
 }
 

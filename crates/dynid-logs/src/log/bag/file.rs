@@ -38,7 +38,7 @@ pub(super) enum End {
 pub(super) type Take<'a> = &'a mut dyn FnMut(RawMessage<'_>) -> ControlFlow<()>;
 
 /// A file of a bag.
-pub(super) trait BagFile {
+pub(super) trait BagFile: Send {
     /// Topics by their channels.
     fn topics(&self) -> &BTreeMap<u32, Topic>;
 

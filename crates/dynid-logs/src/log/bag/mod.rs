@@ -3,6 +3,7 @@
 //! Columns are the numbers of the messages, named by topic and field (`/joint_states/<joint>/position`). Every message is a row; messages
 //! of several topics with one stamp share it. What a row does not have is NaN.
 
+mod blocks;
 mod clock;
 mod definition;
 mod file;
@@ -27,17 +28,18 @@ use dynid_files::digest::Hashed;
 use dynid_files::excerpt::listed;
 use dynid_files::input;
 
-use self::clock::{Choice, Clock, Times};
+use self::blocks::{Layout, Place};
+use self::clock::{Choice, Clock, Stamps, Times};
 use self::file::{BagFile, End, RawMessage};
 use self::joined::{Joined, TopicRows, Topics};
 use self::mcap::Mcap;
 use self::rosbag::RosBag;
 use self::sqlite::Sqlite;
-use self::topics::{Decoded, Encoding};
+use self::topics::{Decoded, Encoding, Values};
 use super::arrays::TableBuilder;
 use super::format::LogFormat;
 use super::header::LogHeader;
-use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
+use super::{LogOptions, LogSource, Missing, ReadingNote, TableBlocks, Wanted, one_block, places_of};
 use crate::csv::{LogFileError, Table};
 
 /// How a bag is kept.
@@ -215,15 +217,16 @@ impl BagLog {
         };
         Ok(())
     }
+}
 
-    /// SHA-256 of all files, one behind the other.
-    fn digest(&self) -> std::io::Result<String> {
-        let mut all: Box<dyn Read> = Box::new(std::io::empty());
-        for path in &self.paths {
-            all = Box::new(all.chain(input::open(path)?));
-        }
-        Hashed::new(all).finish()
+/// SHA-256 of all files, one behind the other.
+fn digest(name: &str, paths: &[PathBuf]) -> Result<String, LogFileError> {
+    let mut all: Box<dyn Read> = Box::new(std::io::empty());
+    let unreadable = |error| LogFileError::Unreadable { file: name.to_owned(), error };
+    for path in paths {
+        all = Box::new(all.chain(input::open(path).map_err(unreadable)?));
     }
+    Hashed::new(all).finish().map_err(unreadable)
 }
 
 /// Per topic, where its columns go among those that are read of it.
@@ -240,15 +243,7 @@ impl LogSource for BagLog {
 
     fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
         let (columns, times) = places_of(&self.header, &self.header(), wanted);
-        let mut slots = Slots::new();
-        let mut slot_of: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
-        for k in columns.iter().filter(|k| **k >= CLOCKS.len()) {
-            let (topic, column) = self.places[*k - CLOCKS.len()];
-            let slots = slots.entry(topic).or_insert_with(|| vec![None; self.topics[topic].columns.len()]);
-            let next = slots.iter().flatten().count();
-            let slot = *slots[column].get_or_insert(next);
-            slot_of.insert(*k, (topic, slot));
-        }
+        let (slots, slot_of) = self.slots(&columns);
         let read = self.collect(&slots)?;
         let choice = self.clock(&read, &times)?;
         let joined = Joined::of(&read, choice.clock);
@@ -269,8 +264,7 @@ impl LogSource for BagLog {
             let missing = if is_time { Missing::Error } else { wanted.missing };
             out.add(&self.header.names[k], &values, 0, 1, is_time, missing)?;
         }
-        let digest = self.digest();
-        let sha256 = digest.map_err(|error| LogFileError::Unreadable { file: self.name.clone(), error })?;
+        let sha256 = digest(&self.name, &self.paths)?;
         let clock = match choice.clock {
             Clock::Header => "stamps of headers",
             Clock::Receipt => "times of receipt",
@@ -283,9 +277,107 @@ impl LogSource for BagLog {
         }
         Ok((out.finish(sha256), self.notes))
     }
+
+    /// Of one topic whose messages all have what is wanted, message by message; else all rows at once, since a row may be filled up from others.
+    fn blocks(
+        mut self: Box<Self>,
+        wanted: &Wanted,
+        rows: usize,
+    ) -> Result<Box<dyn TableBlocks>, LogFileError> {
+        let (columns, times) = places_of(&self.header, &self.header(), wanted);
+        let (slots, slot_of) = self.slots(&columns);
+        let [(topic, own)] = slots.iter().collect::<Vec<_>>()[..] else { return one_block(self, wanted) };
+        let Some(read) = self.times_of(*topic, own)? else { return one_block(self, wanted) };
+        let choice = self.clock(&read, &times)?;
+        let place = |k: &usize| match k {
+            0 => Place::Stamp(choice.clock),
+            1 => Place::Stamp(Clock::Header),
+            2 => Place::Stamp(Clock::Receipt),
+            _ => Place::Slot(slot_of[k].1),
+        };
+        let only = &read[topic].times;
+        let total = only.receipt.len();
+        if total == 0 {
+            return Err(LogFileError::NoRows { file: self.name, line: 0 });
+        }
+        let (first, last) = TableBuilder::rows_of(&self.name, total, self.options.read.rows)?;
+        let layout = Layout {
+            topic: *topic,
+            slots: own.clone(),
+            names: columns.iter().map(|k| self.header.names[*k].clone()).collect(),
+            places: columns.iter().map(place).collect(),
+            is_time: columns.iter().map(|k| *k < CLOCKS.len() || times.contains(k)).collect(),
+            has_headers: !only.header.is_empty(),
+        };
+        blocks::start(*self, layout, first - 1..last, rows.max(1), wanted.missing)
+    }
 }
 
 impl BagLog {
+    /// Times of all messages of a topic; `None` if one of them lacks a wanted value.
+    fn times_of(&mut self, topic: usize, slots: &[Option<usize>]) -> Result<Option<Topics>, LogFileError> {
+        let wanted = slots.iter().flatten().count();
+        let is_wanted = |column: &usize| slots.get(*column).is_some_and(Option::is_some);
+        let (mut header, mut receipt) = (Stamps::default(), Stamps::default());
+        let (mut lacks, mut headers) = (false, true);
+        let scanned = self.each_of(topic, &mut |received, values| {
+            let all = values.numbers.iter().zip(values.columns);
+            lacks |= all.filter(|(x, column)| is_wanted(column) && !x.is_nan()).count() != wanted;
+            receipt.push(received);
+            match values.stamp.filter(|_| headers) {
+                Some(stamp) => header.push(stamp),
+                None => headers = false,
+            }
+            if lacks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        scanned.iter().for_each(|end| self.note_end(end));
+        let header = if headers { header.finish() } else { Vec::new() };
+        let times = Times { header, receipt: receipt.finish() };
+        Ok((!lacks).then(|| [(topic, TopicRows { times, ..TopicRows::default() })].into()))
+    }
+
+    /// Hands over the messages of a topic that can be taken apart: the time of receipt and the values.
+    fn each_of(
+        &mut self,
+        topic: usize,
+        take: &mut dyn FnMut(i64, Values<'_>) -> ControlFlow<()>,
+    ) -> Result<Vec<End>, LogFileError> {
+        let (mut ends, mut is_done) = (Vec::new(), false);
+        for (place, source) in self.files.iter().enumerate() {
+            let own = |((file, _), of): &(&(usize, u32), &usize)| *file == place && **of == topic;
+            let wanted: Vec<u32> = self.channels.iter().filter(own).map(|((_, c), _)| *c).collect();
+            let decoded = &mut self.topics[topic];
+            let end = source.messages(&wanted, &mut |message| {
+                let Ok(values) = decoded.decode(message.data) else { return ControlFlow::Continue(()) };
+                let flow = take(message.received, values);
+                is_done = flow.is_break();
+                flow
+            });
+            let damaged =
+                |reason| LogFileError::Damaged { file: self.name.clone(), format: self.format, reason };
+            ends.push(end.map_err(damaged)?);
+            if is_done {
+                break;
+            }
+        }
+        Ok(ends)
+    }
+}
+
+impl BagLog {
+    /// Where the columns of each topic go, and topic and place of each column.
+    fn slots(&self, columns: &[usize]) -> (Slots, BTreeMap<usize, (usize, usize)>) {
+        let (mut slots, mut slot_of) = (Slots::new(), BTreeMap::new());
+        for k in columns.iter().filter(|k| **k >= CLOCKS.len()) {
+            let (topic, column) = self.places[*k - CLOCKS.len()];
+            let slots = slots.entry(topic).or_insert_with(|| vec![None; self.topics[topic].columns.len()]);
+            let next = slots.iter().flatten().count();
+            let slot = *slots[column].get_or_insert(next);
+            slot_of.insert(*k, (topic, slot));
+        }
+        (slots, slot_of)
+    }
+
     /// Reads the messages of the topics of which columns are wanted.
     fn collect(&mut self, slots: &Slots) -> Result<Topics, LogFileError> {
         let of_topic = |(topic, slots): (&usize, &Vec<Option<usize>>)| {
