@@ -247,12 +247,25 @@ fn spliced(text: &str, mut splices: Vec<(Range<usize>, String)>) -> String {
 fn principal(tensor: &[[f64; 3]; 3]) -> String {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = *tensor;
     if [xy, xz, yz] == [0.0; 3] {
+        let [xx, yy, zz] = possible([xx, yy, zz]);
         return format!("diaginertia=\"{xx:?} {yy:?} {zz:?}\"");
     }
-    let ([a, b, c], axes) = symmetric::eigen(tensor);
+    let (moments, axes) = symmetric::eigen(tensor);
+    let [a, b, c] = possible(moments);
     let [x, y, _] = Mat3::from_rows(axes).0;
     let [w, i, j, k] = quaternion(&Mat3([x, y, x.cross(y)]));
     format!("diaginertia=\"{a:?} {b:?} {c:?}\" quat=\"{w:?} {i:?} {j:?} {k:?}\"")
+}
+
+/// Principal moments that MuJoCo takes: of a flat body the largest one is the sum of the others, and rounding must not make it larger.
+fn possible(mut moments: [f64; 3]) -> [f64; 3] {
+    for k in 0..3 {
+        let others = moments[(k + 1) % 3] + moments[(k + 2) % 3];
+        if moments[k] > others && moments[k] <= others * (1.0 + 1e-9) {
+            moments[k] = others;
+        }
+    }
+    moments
 }
 
 /// The bytes between the quotes of an attribute whose name begins at an offset.

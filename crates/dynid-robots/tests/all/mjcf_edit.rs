@@ -112,6 +112,25 @@ fn all_but_what_is_set_stays_byte_for_byte() {
     assert_eq!(mjcf::edit(ARM, "m.xml".as_ref(), &[], &[]).unwrap()[0].text, ARM);
 }
 
+/// Moments of a flat body, of which the largest is the sum of the others: rounded apart MuJoCo would refuse them.
+#[test]
+fn flat_bodies_are_not_refused_for_rounding() {
+    let text = "<mujoco><worldbody><body name=\"x\"><joint name=\"j\"/><geom size=\"0.1\"/></body></worldbody></mujoco>";
+    for k in 1..200 {
+        let (a, b) = (0.1 * f64::from(k), 0.3 + 0.7 / f64::from(k));
+        let tensor = Mat3::from_rows([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, a + b]]);
+        let com = Vec3([0.3, -0.2, 0.1 * f64::from(k % 7)]);
+        let links = [("x".to_owned(), Inertia::from_com(2.0, com, &tensor))];
+        let edited = mjcf::edit(text, "m.xml".as_ref(), &links, &[]).unwrap();
+        let (_, behind) = edited[0].text.split_once("diaginertia=\"").unwrap();
+        let moments: Vec<f64> =
+            behind.split('"').next().unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+        let largest = moments.iter().copied().fold(0.0, f64::max);
+        let others = moments.iter().enumerate().filter(|(_, x)| **x < largest).map(|(_, x)| *x);
+        assert!(others.sum::<f64>() >= largest, "{moments:?}");
+    }
+}
+
 #[test]
 fn inertias_count_whatever_the_compiler_makes_of_them() {
     let world = "<worldbody><body name=\"x\"><joint name=\"j\"/><geom size=\"0.1\"/><body name=\"y\" pos=\"1 0 0\"><joint name=\"k\"/><geom size=\"0.2\"/></body></body><body name=\"still\"><geom size=\"3\"/></body></worldbody>";
