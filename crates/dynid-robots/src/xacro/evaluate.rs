@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use super::expression::{Comparison, Expression, Operator};
 use super::functions;
 use super::names::{Failure, Names};
-use super::value::{MAX_LIST, MAX_TEXT, Value, bounded_list, bounded_text, entries};
+use super::value::{MAX_LIST, MAX_TEXT, MAX_WEIGHT, Value, bounded_list, bounded_text, entries};
+use crate::xacro_fault::XacroFault;
 
 /// An evaluation with its own names of comprehensions.
 pub(super) struct Evaluation<'a, N: Names> {
@@ -22,7 +23,29 @@ impl<'a, N: Names> Evaluation<'a, N> {
         self.names.enter()?;
         let value = self.value_here(expression);
         self.names.leave();
-        value
+        let value = value?;
+        // What an expression makes is weighed; what it only names was weighed where it was made.
+        if let Expression::List(_)
+        | Expression::Comprehension { .. }
+        | Expression::Binary(..)
+        | Expression::Call(..)
+        | Expression::Slice(..) = expression
+        {
+            self.weigh(&value)?;
+        }
+        Ok(value)
+    }
+
+    fn weigh(&mut self, value: &Value) -> Result<(), Failure> {
+        let weight = value.weight();
+        let weight =
+            weight.ok_or(XacroFault::TooMuch { what: "values in one another", limit: MAX_WEIGHT })?;
+        Ok(self.names.spend(weight)?)
+    }
+
+    /// Counts what an operation goes through.
+    fn look_at(&mut self, values: &[&Value]) -> Result<(), Failure> {
+        Ok(self.names.spend(values.iter().map(|value| value.length()).sum())?)
     }
 
     fn value_here(&mut self, expression: &Expression) -> Result<Value, Failure> {
@@ -41,6 +64,7 @@ impl<'a, N: Names> Evaluation<'a, N> {
             Expression::Not(of) => Value::Bool(!self.value(of)?.is_true()),
             Expression::Binary(operator, left, right) => {
                 let (left, right) = (self.value(left)?, self.value(right)?);
+                self.look_at(&[&left, &right])?;
                 binary(*operator, &left, &right)?
             }
             Expression::And(left, right) => match self.value(left)? {
@@ -55,6 +79,9 @@ impl<'a, N: Names> Evaluation<'a, N> {
                 let mut left = self.value(first)?;
                 for (comparison, other) in others {
                     let right = self.value(other)?;
+                    // All that lists hold may be compared.
+                    self.weigh(&left)?;
+                    self.weigh(&right)?;
                     if !compare(*comparison, &left, &right)? {
                         return Ok(Value::Bool(false));
                     }
@@ -69,10 +96,12 @@ impl<'a, N: Names> Evaluation<'a, N> {
             Expression::Call(function, values, named) => self.call(function, values, named)?,
             Expression::Index(of, index) => {
                 let (of, index) = (self.value(of)?, self.value(index)?);
+                self.look_at(&[&of])?;
                 entry_at(&of, &index)?
             }
             Expression::Slice(of, start, end) => {
                 let of = self.value(of)?;
+                self.look_at(&[&of])?;
                 let bound = |end: Option<&Expression>, own: &mut Self| match end {
                     Some(end) => own.value(end).map(Some),
                     None => Ok(None),
@@ -82,6 +111,7 @@ impl<'a, N: Names> Evaluation<'a, N> {
             }
             Expression::Attribute(of, name) => {
                 let of = self.value(of)?;
+                self.look_at(&[&of])?;
                 self.attribute(of, name)?
             }
         })
@@ -155,6 +185,10 @@ impl<'a, N: Names> Evaluation<'a, N> {
     ) -> Result<Value, Failure> {
         let function = self.value(function)?;
         let values = self.values(values)?;
+        // Texts of lists, orders of lists: a function may go through all that they hold.
+        for value in &values {
+            self.weigh(value)?;
+        }
         let mut by_name = Vec::with_capacity(named.len());
         for (name, value) in named {
             by_name.push((name.clone(), self.value(value)?));
@@ -326,14 +360,20 @@ fn entry_at(of: &Value, index: &Value) -> Result<Value, String> {
     if let Value::Map(_) = of {
         return of.entry(index).cloned().ok_or_else(|| format!("the dictionary has no key `{index}`"));
     }
-    let list = match of {
-        Value::List(_) | Value::Text(_) => entries(of)?,
+    let (length, text) = match of {
+        Value::List(list) => (list.len(), None),
+        Value::Text(text) => (text.chars().count(), Some(text)),
         other => return Err(format!("a {} has no entries", other.kind())),
     };
     let place = index.whole().ok_or_else(|| format!("expected a whole number, found a {}", index.kind()))?;
-    let place = if place < 0 { place + list.len() as i64 } else { place };
-    let entry = usize::try_from(place).ok().and_then(|place| list.get(place));
-    entry.cloned().ok_or_else(|| format!("expected an index below {}, found {index}", list.len()))
+    let place = if place < 0 { place.saturating_add(length as i64) } else { place };
+    let place = usize::try_from(place).ok().filter(|place| *place < length);
+    let place = place.ok_or_else(|| format!("expected an index below {length}, found {index}"))?;
+    let entry = match (of, text) {
+        (Value::List(list), _) => list.get(place).cloned(),
+        (_, text) => text.and_then(|text| text.chars().nth(place)).map(|c| Value::text(c.to_string())),
+    };
+    entry.ok_or_else(|| format!("expected an index below {length}, found {index}"))
 }
 
 fn slice(of: &Value, start: Option<&Value>, end: Option<&Value>) -> Result<Value, String> {

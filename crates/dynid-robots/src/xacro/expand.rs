@@ -12,7 +12,7 @@ use super::evaluate::Evaluation;
 use super::names::{Failure, Names};
 use super::symbols::{OUTERMOST, Property, Scopes};
 use super::tree::{self, At, Element, Node};
-use super::value::{MAX_TEXT, Value};
+use super::value::{MAX_TEXT, MAX_WEIGHT, Value};
 use super::{Expanded, expression, functions, is_name, packages, yaml};
 use crate::robot_error::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
@@ -244,7 +244,11 @@ impl Expansion {
                 return Err(XacroFault::TooMuch { what: "bytes of a text", limit: MAX_TEXT });
             }
         }
-        Ok(Value::text(joined))
+        self.bytes += joined.len();
+        match self.bytes > MAX_BYTES {
+            true => Err(XacroFault::TooMuch { what: "bytes", limit: MAX_BYTES }),
+            false => Ok(Value::text(joined)),
+        }
     }
 
     /// The value of what stands in `${..}`, in which `$(..)` may stand.
@@ -381,17 +385,23 @@ impl Expansion {
     }
 
     fn enter(&mut self) -> Result<(), XacroFault> {
-        self.steps += 1;
         self.depth += 1;
-        match () {
-            () if self.depth > MAX_DEPTH => Err(XacroFault::TooMuch { what: "levels", limit: MAX_DEPTH }),
-            () if self.steps > MAX_STEPS => Err(XacroFault::TooMuch { what: "steps", limit: MAX_STEPS }),
-            () => Ok(()),
+        match self.depth > MAX_DEPTH {
+            true => Err(XacroFault::TooMuch { what: "levels", limit: MAX_DEPTH }),
+            false => self.spend(1),
         }
     }
 
     fn leave(&mut self) {
         self.depth -= 1;
+    }
+
+    fn spend(&mut self, steps: usize) -> Result<(), XacroFault> {
+        self.steps = self.steps.saturating_add(steps);
+        match self.steps > MAX_STEPS {
+            true => Err(XacroFault::TooMuch { what: "steps", limit: MAX_STEPS }),
+            false => Ok(()),
+        }
     }
 }
 
@@ -435,8 +445,12 @@ impl Names for Seen<'_> {
 
     fn yaml(&mut self, file: &str) -> Result<Value, XacroFault> {
         let path = self.expansion.folder().join(file);
-        let text = self.expansion.read(&path).and_then(|text| yaml::parse(&text));
-        text.map_err(|reason| XacroFault::File { file: path.display().to_string(), reason })
+        let value = self.expansion.read(&path).and_then(|text| yaml::parse(&text));
+        let value = value.map_err(|reason| XacroFault::File { file: path.display().to_string(), reason })?;
+        // Aliases share what they stand for.
+        let weight = value.weight();
+        self.spend(weight.ok_or(XacroFault::TooMuch { what: "values in one another", limit: MAX_WEIGHT })?)?;
+        Ok(value)
     }
 
     fn path(&self, file: &str) -> String {
@@ -449,5 +463,9 @@ impl Names for Seen<'_> {
 
     fn leave(&mut self) {
         self.expansion.leave();
+    }
+
+    fn spend(&mut self, values: usize) -> Result<(), XacroFault> {
+        self.expansion.spend(values)
     }
 }

@@ -43,9 +43,11 @@ pub(crate) struct Expanded {
     pub(crate) included: Vec<SourceFile>,
 }
 
-/// Whether a text is to be expanded: its name ends in `.xacro`, or it has tags of xacro.
+/// Whether a text is to be expanded: its name ends in `.xacro`, or it has tags of xacro. Those in comments, which files that were expanded before
+/// keep, are none.
 pub(crate) fn is_xacro(text: &str, path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xacro")) || text.contains("<xacro:")
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xacro"))
+        || (text.contains("<xacro:") && tree::has_tags(text))
 }
 
 /// Expands the text of a file; `arguments` is `name:=value,name:=value`, as it stands behind `#` in `FILE#ARGUMENTS`.
@@ -92,7 +94,7 @@ fn is_name(text: &str) -> bool {
 /// The value of an expression without names of its own, such as `pi / 2`.
 fn constant(text: &str) -> Result<f64, String> {
     let expression = expression::parse(text)?;
-    let value = Evaluation::new(&mut Nothing { depth: 0 }).value(&expression);
+    let value = Evaluation::new(&mut Nothing { depth: 0, spent: 0 }).value(&expression);
     match value.map(|value| value.number()) {
         Ok(Some(x)) => Ok(x),
         Ok(None) => Err(format!("expected a number, found `{}`", excerpt(text))),
@@ -104,6 +106,7 @@ fn constant(text: &str) -> Result<f64, String> {
 /// Surroundings without names.
 struct Nothing {
     depth: usize,
+    spent: usize,
 }
 
 impl Names for Nothing {
@@ -131,12 +134,21 @@ impl Names for Nothing {
         self.depth += 1;
         match self.depth > expand::MAX_DEPTH {
             true => Err(XacroFault::TooMuch { what: "levels", limit: expand::MAX_DEPTH }),
-            false => Ok(()),
+            false => self.spend(1),
         }
     }
 
     fn leave(&mut self) {
         self.depth -= 1;
+    }
+
+    /// A scalar of a file, however it is written, makes few values: its length has a bound.
+    fn spend(&mut self, values: usize) -> Result<(), XacroFault> {
+        self.spent += values;
+        match self.spent > value::MAX_WEIGHT {
+            true => Err(XacroFault::TooMuch { what: "steps", limit: value::MAX_WEIGHT }),
+            false => Ok(()),
+        }
     }
 }
 

@@ -46,4 +46,7 @@ pub(super) trait Names {
 
     /// Leaves a level.
     fn leave(&mut self);
+
+    /// Counts values that were made or gone through.
+    fn spend(&mut self, values: usize) -> Result<(), XacroFault>;
 }

@@ -263,12 +263,12 @@ impl Expansion {
     /// The files that a name or a pattern means, sorted.
     fn meant(&self, element: &Element, path: &Path) -> Result<Vec<PathBuf>, RobotFileError> {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let text = path.to_string_lossy();
-        if !text.contains(['*', '?', '[']) {
+        // A name with a bracket is a name where there is a file of it.
+        if !name.contains(['*', '?', '[']) || path.exists() {
             return Ok(vec![path.to_owned()]);
         }
         let (start, end) = match name.split_once('*') {
-            Some((start, end)) if text.matches(['*', '?', '[']).count() == 1 => (start, end),
+            Some((start, end)) if name.matches(['*', '?', '[']).count() == 1 => (start, end),
             _ => {
                 let found = format!("`{name}`");
                 return Err(self.unfit(

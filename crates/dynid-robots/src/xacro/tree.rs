@@ -53,6 +53,21 @@ impl Element {
     }
 }
 
+/// Whether a text has an element of xacro, as far as it is XML.
+pub(super) fn has_tags(text: &str) -> bool {
+    let mut reader = Reader::from_str(text);
+    reader.config_mut().allow_dangling_amp = true;
+    loop {
+        match reader.read_event() {
+            Ok(Event::Start(start) | Event::Empty(start)) if start.name().0.starts_with("xacro:") => {
+                return true;
+            }
+            Ok(Event::Eof) | Err(_) => return false,
+            Ok(_) => {}
+        }
+    }
+}
+
 /// Reads the outermost element of a text; `file` numbers it in [`At`].
 pub(super) fn parse(text: &str, name: &str, file: usize) -> Result<Arc<Element>, RobotFileError> {
     let mut reader = Reader::from_str(text);

@@ -8,8 +8,13 @@ use std::sync::Arc;
 pub(super) const MAX_TEXT: usize = 1 << 20;
 /// Most entries of a list that an expression may make.
 pub(super) const MAX_LIST: usize = 100_000;
-/// Deepest nesting of lists and dictionaries that is written or compared.
+/// Deepest nesting of lists and dictionaries.
 const MAX_DEPTH: usize = 64;
+/// Most values in a value, those that stand there twice counted twice: lists share what they hold, so that a short expression could stand for more
+/// than any memory once it is written or compared.
+pub(super) const MAX_WEIGHT: usize = 1_000_000;
+/// Bytes of a text that weigh as much as a value.
+const BYTES: usize = 32;
 
 /// A value.
 #[derive(Clone, Debug)]
@@ -173,6 +178,35 @@ impl Value {
                 (Some(a), Some(b)) => Some(a.cmp(&b)),
                 _ => self.number()?.partial_cmp(&other.number()?),
             },
+        }
+    }
+
+    /// How many values it holds, itself among them; `None`: more than [`MAX_WEIGHT`], or deeper than any list of a robot file.
+    pub(super) fn weight(&self) -> Option<usize> {
+        let mut left = MAX_WEIGHT;
+        self.weigh(MAX_DEPTH, &mut left).then(|| MAX_WEIGHT - left)
+    }
+
+    fn weigh(&self, depth: usize, left: &mut usize) -> bool {
+        let own = 1 + if let Value::Text(text) = self { text.len() / BYTES } else { 0 };
+        let (Some(rest), Some(depth)) = (left.checked_sub(own), depth.checked_sub(1)) else { return false };
+        *left = rest;
+        match self {
+            Value::List(list) => list.iter().all(|value| value.weigh(depth, left)),
+            Value::Map(map) => {
+                map.iter().all(|(key, value)| key.weigh(depth, left) && value.weigh(depth, left))
+            }
+            _ => true,
+        }
+    }
+
+    /// How many values a function goes through that looks at each once.
+    pub(super) fn length(&self) -> usize {
+        match self {
+            Value::Text(text) => text.len() / BYTES,
+            Value::List(list) => list.len(),
+            Value::Map(map) => map.len(),
+            _ => 0,
         }
     }
 

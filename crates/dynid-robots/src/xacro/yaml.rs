@@ -10,6 +10,8 @@ use super::value::Value;
 const MAX_DEPTH: usize = 64;
 /// Most values.
 const MAX_VALUES: usize = 200_000;
+/// Most keys of a mapping, which are looked for one after the other.
+const MAX_KEYS: usize = 5_000;
 
 /// A list or mapping that is being read.
 enum Open {
@@ -100,7 +102,10 @@ fn put(map: &mut Vec<(Value, Value)>, key: Value, value: Value, line: usize) -> 
         }
         _ => {
             set(map, key, value, true);
-            Ok(())
+            match map.len() > MAX_KEYS {
+                true => Err(format!("line {line}: expected at most {MAX_KEYS} keys of a mapping")),
+                false => Ok(()),
+            }
         }
     }
 }
@@ -120,7 +125,7 @@ fn scalar(text: &str, style: ScalarStyle, tag: Option<&Tag>) -> Result<Value, St
         _ => None,
     };
     if let Some(unit) = unit {
-        // Expressions such as `pi/2` are computed by the caller's own evaluator in xacro; numbers are what files have.
+        // `!radians pi/2` is an expression, without names of the file.
         return match number(text).and_then(|n| n.number()) {
             Some(x) => Ok(Value::Float(x * unit)),
             None => super::constant(text).map(|x| Value::Float(x * unit)),

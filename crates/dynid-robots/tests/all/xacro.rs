@@ -177,6 +177,35 @@ fn files_arguments_packages_and_yaml_are_read() {
 }
 
 #[test]
+fn data_of_any_size_is_refused_beyond_its_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let laughs = (1..30).fold("a0: &a0 [1, 2, 3, 4]\n".to_owned(), |text, k| {
+        let below = format!("*a{}, ", k - 1).repeat(4);
+        format!("{text}a{k}: &a{k} [{below}]\n")
+    });
+    let wide: String = (0..10_000).map(|k| format!("k{k}: {k}\n")).collect();
+    let main = folder.path().join("arm.xacro");
+    let text = format!(
+        "{HEAD}<xacro:property name=\"d\" value=\"${{xacro.load_yaml('data.yaml')}}\"/><link name=\"${{d}}\"/></robot>"
+    );
+    fs::write(&main, text).unwrap();
+    for data in [laughs, wide] {
+        fs::write(folder.path().join("data.yaml"), data).unwrap();
+        let error = robot::read(&main).unwrap_err().to_string();
+        assert!(error.contains("at most"), "{error}");
+    }
+}
+
+/// A robot whose comments or texts speak of xacro is no xacro: it is edited byte for byte.
+#[test]
+fn a_comment_makes_no_xacro() {
+    let text =
+        "<robot name=\"r\"><!-- made from <xacro:arm prefix=\"${x}\"/> --><link name=\"base\"/></robot>";
+    let read = robot::parse(text, "r.urdf").unwrap();
+    assert_eq!(read.xml.unwrap().to_string(), text);
+}
+
+#[test]
 fn faults_have_places_and_hints() {
     for (inner, place, message) in [
         ("<a v=\"${x}\"/>", "r.urdf.xacro:2:1", "`x`: `x` is not defined"),
@@ -246,7 +275,17 @@ fn growth_has_bounds() {
     let chained = (0..3_000).fold("<xacro:property name=\"t0\" value=\"1\"/>".to_owned(), |text, k| {
         format!("{text}<xacro:property name=\"t{}\" value=\"${{t{k} + 1}}\"/>", k + 1)
     }) + "<a v=\"${t3000}\"/>";
-    for inner in [endless, &doubling, &silent, &texts, &nested, &long, lists, loops, work, &chained] {
+    // What is small to write and large to hold.
+    let rows = "<a v=\"${len([[0] * 100000 for y in range(100000)])}\"/>";
+    let shown = "<a v=\"${len(str([[0] * 1000] * 100000))}\"/>";
+    let words = "<a v=\"${len(['x' * 1000000 for y in range(100000)])}\"/>";
+    let shared = (0..60).fold("<xacro:property name=\"l0\" value=\"${[1, 2]}\"/>".to_owned(), |text, k| {
+        format!("{text}<xacro:property name=\"l{}\" value=\"${{[l{k}, l{k}]}}\"/>", k + 1)
+    }) + "<a v=\"${l60 == [l59, l59]}\"/>";
+    for inner in [
+        endless, &doubling, &silent, &texts, &nested, &long, lists, loops, work, &chained, rows, shown,
+        words, &shared,
+    ] {
         let (_, fault) = fault(inner);
         let text = fault.to_string();
         assert!(text.contains("at most") || text.contains("expected one `for`"), "{text}");
