@@ -95,13 +95,14 @@ impl ServoResult {
             })
             .collect();
         let mut files = Vec::new();
-        let name = self.robot.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let own = FileMember::of(&self.robot.path).path;
+        let name = own.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let stem = robot::stem(&self.robot.path);
         let actuators = self.actuators_xml(&names);
         if let Some(text) = source.mjcf_text() {
-            let mut edited = mjcf::edit(text, &FileMember::of(&self.robot.path).path, &[], &joints)?;
+            let mut edited = mjcf::edit(text, &own, &[], &joints)?;
             files.push((format!("{stem}.xml"), edited.remove(0).text));
-            let folder = self.robot.path.parent().unwrap_or(Path::new(""));
+            let folder = own.parent().unwrap_or(Path::new(""));
             for included in source.included() {
                 let text = match edited.iter().find(|f| f.name == included) {
                     Some(file) => file.text.clone(),

@@ -339,6 +339,17 @@ pub fn clamped(
     let robot = if options.locked.is_empty() { plain } else { Robot::load(file, &options)? };
     refuse_loops(&robot, "identified from commands and positions")?;
     refuse_elastic(&robot, "identified from commands and positions")?;
+    let of_robot = |joint: &String| robot.rate_names().contains(joint);
+    let own = robot.elements.per_joint.iter().filter(|(_, list)| list.iter().any(|e| e == "spring"));
+    let beside = robot.elements.beside.iter().filter(|(_, e)| e == "spring").map(|(joint, _)| joint);
+    let sprung: Vec<&str> =
+        own.map(|(joint, _)| joint).chain(beside).filter(|j| of_robot(j)).map(String::as_str).collect();
+    if !sprung.is_empty() {
+        warnings.push(format!(
+            "a drive has no spring: those of `{}` are left out, and the fit takes their effort for friction and a constant effort",
+            sprung.join("`, `")
+        ));
+    }
     // What the file says of bodies is what the scale of all efforts hangs on.
     warnings.extend(robot.warnings.iter().cloned());
     Ok((robot, warnings))

@@ -157,6 +157,15 @@ def test_springs_are_identified_and_put_back(angle: str, tmp_path: Path) -> None
             assert np.abs(ours - theirs).max() < 1e-12 * np.abs(theirs).max()
             assert np.abs(tau - theirs).max() < 1e-3 * np.abs(tau).max()
 
+    # A spring at a joint that stands still pulls at it all the same: its effort is no part of what the masses weigh.
+    still = q * [1, 0] + [0, 0.3]
+    as_stated = plain(tmp_path / "arm.xml")
+    tau = efforts(as_stated, still, v * [1, 0], a * [1, 0])
+    found = dynid.identify(robot, dynid.Log(motion.t, still, tau, joints=robot.joints), elements={"default": ["viscous"], "friction": "given"})
+    other, rest = q[::-1] * [-0.5, 0] + [0.2, 0.3], np.zeros_like(q)
+    theirs = efforts(as_stated, other, rest, rest)
+    assert np.abs(found.predict(other, rest, rest) - theirs).max() < 1e-3 * np.abs(theirs).max()
+
 
 @pytest.mark.filterwarnings("ignore::dynid.DynidWarning")
 def test_identified_values_go_into_the_own_files(tmp_path: Path) -> None:

@@ -236,6 +236,11 @@ def test_arrays_give_drives_and_drives_the_next_motion(tmp_path: Path) -> None:
     alone = dynid.servo(robot, logs[0], gains="own", fit=[])
     assert alone.record["fit"]["efforts"] == []
 
+    # A spring is no part of a drive.
+    model = mujoco.MjModel.from_xml_string(ARM)
+    model.jnt_stiffness[1] = 0.5
+    assert any("a drive has no spring: those of `elbow`" in w for w in dynid.servo(dynid.Robot.from_mujoco(model), log, **gains).warnings)
+
     with pytest.raises(dynid.SettingError):
         dynid.servo(robot, log, position_gan=3)
     with pytest.raises(ValueError, match="shape"):

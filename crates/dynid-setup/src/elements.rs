@@ -77,7 +77,7 @@ impl ElementPlan {
     /// Elements as the robot file (or the configuration) says; joints and motors about which nothing is said get
     /// [`DEFAULTS`] if they move, joints behind a spring without `rotor`: theirs turns with the motor; joints with clearance without
     /// `coulomb`: the friction of their bearings has a law of its own. A spring that the file of another format states comes beside the defaults, in
-    /// place of `offset`.
+    /// place of `offset`; a joint that stands still has it too.
     ///
     /// `moves`: whether the logs move the joint of each rate.
     ///
@@ -126,14 +126,14 @@ impl ElementPlan {
         };
         for (rate, name) in names.iter().enumerate() {
             let stated = spec.per_joint.iter().find(|(joint, _)| joint == name);
+            let beside: Vec<&String> =
+                spec.beside.iter().filter(|(joint, _)| joint == name).map(|(_, e)| e).collect();
             let list = match stated {
                 _ if floats(rate) => Vec::new(),
                 Some((_, list)) => list.clone(),
                 None if moves(rate) => {
                     let behind = spec.elastic.iter().any(|e| e.joint == *name);
                     let rubs = spec.clearance.iter().any(|c| c.joint == *name);
-                    let beside: Vec<&String> =
-                        spec.beside.iter().filter(|(joint, _)| joint == name).map(|(_, e)| e).collect();
                     // A constant effort is the same as another rest position of a spring.
                     let springs = beside.iter().any(|e| *e == SPRING);
                     let left_out = |d: &str| {
@@ -144,7 +144,8 @@ impl ElementPlan {
                     let own = defaults.iter().filter(|d| !left_out(d) && !beside.contains(d));
                     own.chain(beside.iter().copied()).cloned().collect()
                 }
-                None => Vec::new(),
+                // A spring pulls at a joint that stands still too.
+                None => beside.into_iter().filter(|e| *e == SPRING).cloned().collect(),
             };
             plan.per_rate.push(elastic::without_elastic(name, &list, &spec.elastic)?);
         }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dynid_excitation::constraint::Capsule;
 use dynid_excitation::constraint::ConstraintError;
 use dynid_excitation::envelope::{Envelope, Triangle, chain_capsules, chain_radius};
-use dynid_files::SourceFile;
+use dynid_files::{FileMember, SourceFile};
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
 use dynid_model::{Placement, Vec3};
@@ -138,7 +138,8 @@ struct MeshReader {
 
 impl MeshReader {
     fn new(robot: &Robot, config: &DesignConfig) -> Self {
-        let file = robot.file.urdf.as_ref().map_or(robot.path.as_path(), Path::new);
+        let own = FileMember::of(&robot.path).path;
+        let file = robot.file.urdf.as_ref().map_or(own.as_path(), Path::new);
         let folder = file.parent().map_or_else(PathBuf::new, Path::to_path_buf);
         let lengths = robot.mechanism.bodies().iter().map(|b| b.joint.placement.translation.norm());
         MeshReader {

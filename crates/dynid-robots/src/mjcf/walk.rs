@@ -256,7 +256,7 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
         if parameters.stiffness > 0.0 {
             self.model.elements.beside.push((name.to_owned(), "spring".to_owned()));
             self.model.warnings.push(format!(
-                "joint `{name}`: its spring ({} around {}) is its element `spring`, which is identified; rigid bodies alone and drives do not have it",
+                "joint `{name}`: its spring ({} around {}) is its element `spring`, which is identified",
                 parameters.stiffness, parameters.spring_reference
             ));
         }

@@ -334,7 +334,7 @@ impl Reader<'_> {
             if let Some((stiffness, rest)) = stated.spring {
                 self.elements.beside.push((name.clone(), "spring".to_owned()));
                 self.warnings.push(format!(
-                    "{owner}: its spring ({stiffness} around {rest}) is its element `spring`, which is identified; rigid bodies alone and drives do not have it"
+                    "{owner}: its spring ({stiffness} around {rest}) is its element `spring`, which is identified"
                 ));
             }
             if stated.one_end {

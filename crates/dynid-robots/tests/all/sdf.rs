@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::*;
-use dynid_robots::{RobotFile, robot, sdf, urdf};
+use dynid_robots::{RobotFile, SettingValue, robot, sdf, urdf};
 
 /// An arm on a stand: frames of joints away from those of links, poses in each other, axes in other frames.
 const ARM: &str = r#"<?xml version="1.0"?>
@@ -194,12 +194,21 @@ fn what_links_leave_out_is_one_kilogram_and_is_told() {
 
 #[test]
 fn mimic_joints_and_springs() {
-    let text = ARM.replace("<axis><xyz expressed_in", "<axis><mimic joint=\"shoulder\"><multiplier>2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic><dynamics><spring_stiffness>3</spring_stiffness></dynamics><xyz expressed_in");
+    let text = ARM.replace("<axis><xyz expressed_in", "<axis><mimic joint=\"shoulder\"><multiplier>2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic><dynamics><spring_reference>0.2</spring_reference><spring_stiffness>3</spring_stiffness></dynamics><xyz expressed_in");
     let file = read(&text);
     let mimic = file.description.joints[2].mimic.clone().unwrap();
     assert_eq!((mimic.of.as_str(), mimic.ratio), ("shoulder", 2.0));
     assert!((mimic.offset - 0.3).abs() < 1e-15);
-    assert!(file.warnings[0].contains("joint `slide`: its spring (3 around 0)"), "{:?}", file.warnings);
+    assert!(file.warnings[0].contains("joint `slide`: its spring (3 around 0.2)"), "{:?}", file.warnings);
+    let elements = file.elements;
+    assert_eq!(elements.beside, [("slide".to_owned(), "spring".to_owned())]);
+    let stated = |key: &str| {
+        let own = elements.settings.iter().find(|s| (s.element.as_str(), s.key.as_str()) == ("spring", key));
+        own.map(|s| (s.joint.as_str(), s.value.clone()))
+    };
+    // 3 N/m · 0.2 m
+    assert_eq!(stated("stiffness"), Some(("slide", SettingValue::Number(3.0))), "{:?}", elements.settings);
+    assert_eq!(stated("kq0"), Some(("slide", SettingValue::Number(3.0 * 0.2))));
 }
 
 #[track_caller]

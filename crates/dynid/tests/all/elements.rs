@@ -168,3 +168,27 @@ fn elements_that_only_some_motions_tell_apart_are_named() {
     let found = of("[\"viscous\", \"arctangent\"]");
     assert!(found.len() == 1 && found[0].contains("1/fb"), "{found:?}");
 }
+
+/// What stands beside the defaults comes in addition; a spring takes the place of the constant effort, and pulls at a joint that stands still too.
+#[test]
+fn elements_beside_the_defaults() {
+    let of = |elements: &str, moves: bool| {
+        let text = format!(
+            "schema = 1\nname = \"one\"\ndh = \"modified\"\n[[joint]]\nname = \"j1\"\nd = 0.3\nmass = 1.0\n[element.j1]\n{elements}\n"
+        );
+        let robot = toml_robot::parse(&text, "one.toml").map_err(|e| e.to_string())?;
+        let mechanism = robot.description.build().unwrap();
+        let plan = ElementPlan::new(&mechanism, &robot.elements, None, |_| moves).unwrap();
+        Ok(plan.per_rate[0].clone())
+    };
+    let names = |list: &[&str]| Ok::<_, String>(list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+    assert_eq!(of("beside = [\"spring\"]", true), names(&["coulomb", "viscous", "rotor", "spring"]));
+    assert_eq!(
+        of("beside = [\"stribeck\"]", true),
+        names(&["coulomb", "viscous", "offset", "rotor", "stribeck"])
+    );
+    assert_eq!(of("beside = [\"coulomb\"]", true), names(&["viscous", "offset", "rotor", "coulomb"]));
+    assert_eq!(of("beside = [\"spring\", \"stribeck\"]", false), names(&["spring"]));
+    let both = of("elements = [\"viscous\"]\nbeside = [\"spring\"]", true).unwrap_err();
+    assert!(both.contains("no list of all elements of the joint beside it"), "{both}");
+}
