@@ -278,6 +278,12 @@ def test_arrow(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path
         # Of a stream that was cut off the batches that are whole are read.
         (tmp_path / "cut.arrows").write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
         assert len(dynid.read_columns(tmp_path / "cut.arrows")["t"]) in (400, 800)
+    # Texts as polars keeps them have another number of buffers in every batch.
+    short, long = pa.array(["a"] * 1000, pa.string_view()), pa.array([f"text {k} of more than twelve letters" for k in range(1000)], pa.string_view())
+    many = len(t) // 1000 * 1000
+    views = pa.table({"note": pa.chunked_array([long, short] * (many // 2000) + [long] * (many // 1000 % 2)), "t": t[:many], "more": pa.chunked_array([short] * (many // 1000)), "q": pa.array(list(q[:many])), "tau": pa.array(list(tau[:many]))})
+    feather.write_feather(views, tmp_path / "views.feather", chunksize=1000)
+    check(indy7, tmp_path / "views.feather", (t[:many], q[:many], tau[:many]), None)
     kinds = {
         "i8": pa.array([1, None, -3], pa.int8()),
         "u16": pa.array([1, 2, 65535], pa.uint16()),
@@ -341,6 +347,23 @@ def test_long_tables_are_reduced_group_by_group(tmp_path: Path) -> None:
     assert dynid_command(convert) == 0
     for name in ("log.parquet", "one.parquet", "log.feather", "log.mcap"):
         assert found(name) == expected, name
+    # One message that cannot be taken apart is a row less, and is told.
+    broken = 150_000
+    with open(tmp_path / "log.mcap", "rb") as bag, open(tmp_path / "broken.mcap", "wb") as file:
+        copy = pytest.importorskip("mcap.writer").Writer(file)
+        copy.start()
+        for k, (schema, channel, message) in enumerate(pytest.importorskip("mcap.reader").make_reader(bag).iter_messages()):
+            if k == 0:
+                own = copy.register_channel(channel.topic, channel.message_encoding, copy.register_schema(schema.name, schema.encoding, schema.data))
+            data = message.data[:20] if k == broken else message.data
+            copy.add_message(own, message.log_time, data, message.publish_time)
+        copy.finish()
+    lines = (tmp_path / "log.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "less.csv").write_text("".join(lines[: broken + 1] + lines[broken + 2 :]))
+    # The clock fills the gap.
+    assert found("broken.mcap") == found("less.csv")
+    told = dynid.identify(arm, dynid.Log.read(tmp_path / "broken.mcap"))
+    assert "broken messages: 1: they were left out" in told.to_json(), told
 
 
 def test_episodes_of_lerobot(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:

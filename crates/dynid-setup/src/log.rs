@@ -180,7 +180,11 @@ impl Log {
         let guessed = guessed.map(|note| {
             format!("{file}: columns without names are taken for {}: {}", note.value, note.reason)
         });
-        turns.chain(guessed).chain(temperature_warnings(&self.log)).collect()
+        let partly = ["damaged bag", "damaged file", "broken messages"];
+        let partial = self.source.notes.iter().filter(|note| partly.contains(&note.setting.as_str()));
+        let partial =
+            partial.map(|note| format!("{file}: {}: {}: {}", note.setting, note.value, note.reason));
+        turns.chain(guessed).chain(partial).chain(temperature_warnings(&self.log)).collect()
     }
 
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series, after an average over

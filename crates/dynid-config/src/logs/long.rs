@@ -68,7 +68,8 @@ pub fn open(
     if is_whole && let Some(blocks) = rest.take() {
         let (sha256, found) = blocks.finish()?;
         table.sha256 = sha256;
-        notes.extend(found.into_iter().filter(|note| note.setting == "lost messages"));
+        let new: Vec<_> = found.into_iter().filter(|note| !notes.contains(note)).collect();
+        notes.extend(new);
     }
     let file = config.path.display().to_string();
     let mut clock = ClockStart::default();

@@ -54,8 +54,8 @@ pub(super) fn in_blocks(
     // What is not held needs no bound; how hard it is compressed keeps its own.
     options.read.max_bytes = u64::MAX;
     let Assigned { text, mapping, unnamed } = assigned(log, axes, spec, &options)?;
-    let notes = text.notes().iter().cloned().chain(unnamed).collect();
     let blocks = text.blocks(&mapping.wanted(), rows)?;
+    let notes = blocks.notes().iter().cloned().chain(unnamed).collect();
     Ok(InBlocks { blocks, mapping, notes })
 }
 

@@ -384,6 +384,10 @@ impl TableBlocks for ArrayBlocks {
         }))
     }
 
+    fn notes(&self) -> &[ReadingNote] {
+        &self.log.notes
+    }
+
     fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
         Ok((self.log.sha256, self.log.notes))
     }

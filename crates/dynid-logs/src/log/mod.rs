@@ -116,8 +116,8 @@ pub trait LogSource {
     /// [`LogFileError`], the first fault met.
     fn read(self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError>;
 
-    /// Reads columns as [`LogSource::read`] does, about so many rows at a time where the format allows it: text, and groups of rows of Parquet and Arrow,
-    /// whose blocks are larger. Other formats give all rows at once.
+    /// Reads columns as [`LogSource::read`] does, about so many rows at a time where the format allows it: text, groups of rows of Parquet and
+    /// Arrow, and bags of which one topic is wanted whose messages all have it. Other logs give all rows at once.
     ///
     /// # Errors
     /// [`LogFileError`], the first fault met; later ones come with the rows.
@@ -145,7 +145,10 @@ pub trait TableBlocks: Send {
     /// [`LogFileError`], the first fault met.
     fn next_block(&mut self) -> Result<Option<Table>, LogFileError>;
 
-    /// SHA-256 of all bytes of the file, hexadecimal, and what was found out by reading.
+    /// What was found out so far.
+    fn notes(&self) -> &[ReadingNote];
+
+    /// SHA-256 of all bytes of the file, hexadecimal, and what was found out by reading: [`TableBlocks::notes`] behind the last row.
     ///
     /// # Errors
     /// [`LogFileError::Unreadable`].
@@ -162,6 +165,10 @@ struct OneBlock {
 impl TableBlocks for OneBlock {
     fn next_block(&mut self) -> Result<Option<Table>, LogFileError> {
         Ok(self.table.take())
+    }
+
+    fn notes(&self) -> &[ReadingNote] {
+        &self.notes
     }
 
     fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {

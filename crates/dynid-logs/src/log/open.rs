@@ -288,8 +288,12 @@ impl Container {
             #[cfg(feature = "arrow")]
             Container::Arrow => {
                 no_member()?;
-                let read = super::arrow::Arrow::open(reopened(path).map_err(damaged)?);
-                (Box::new(read.map_err(damaged)?), format)
+                let read = super::arrow::Arrow::open(reopened(path).map_err(damaged)?).map_err(damaged)?;
+                if read.is_cut() {
+                    let reason = "it ends within a batch of rows, and those before it are whole";
+                    notes.push(super::ReadingNote::new("damaged file", "read up to its end", reason));
+                }
+                (Box::new(read), format)
             }
             #[cfg(feature = "bags")]
             Container::Mcap | Container::RosBag | Container::Sqlite => {

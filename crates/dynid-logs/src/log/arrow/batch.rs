@@ -22,7 +22,7 @@ pub(super) struct Batch {
     rows: usize,
     /// Numbers of values per node.
     lengths: Vec<usize>,
-    /// Buffers by their place among all.
+    /// Buffers by the places that fields give them.
     buffers: Vec<(usize, Vec<u8>)>,
 }
 
@@ -40,10 +40,12 @@ impl Batch {
         for node in batch.nodes().map_err(wrong)?.into_iter().flatten() {
             lengths.push(usize::try_from(node.length()).map_err(|e| e.to_string())?);
         }
-        let wanted = column.map_or(Vec::new(), |column| buffers_of(column.kept));
         let mut buffers = Vec::new();
-        for place in wanted {
-            buffers.push((place, buffer(file, at, &batch, place)?));
+        if let Some(column) = column {
+            let before = more_buffers(&batch, column.views)?;
+            for place in buffers_of(column.kept) {
+                buffers.push((place, buffer(file, at, &batch, place.saturating_add(before))?));
+            }
         }
         Ok(Batch { rows, lengths, buffers })
     }
@@ -187,6 +189,17 @@ impl Batch {
         }
         Ok(values)
     }
+}
+
+/// Buffers that the first columns of texts have besides the two counted for each.
+fn more_buffers(batch: &RecordBatchRef<'_>, views: usize) -> Result<usize, String> {
+    if views == 0 {
+        return Ok(0);
+    }
+    let counts: Vec<i64> = batch.variadic_buffer_counts().map_err(wrong)?.into_iter().flatten().collect();
+    let own = counts.get(..views).ok_or("expected numbers of buffers of texts, found too few")?;
+    let add = |sum: usize, count: &i64| usize::try_from(*count).ok().and_then(|count| sum.checked_add(count));
+    own.iter().try_fold(0, add).ok_or_else(|| "expected numbers of buffers, found others".to_owned())
 }
 
 /// Places of the buffers of a column.

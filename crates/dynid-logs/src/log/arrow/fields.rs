@@ -50,6 +50,8 @@ pub(super) struct Offsets {
 pub(super) struct Column {
     pub(super) name: String,
     pub(super) kept: Kept,
+    /// Columns of texts before it that have more buffers than the two counted for each, batch by batch another number.
+    pub(super) views: usize,
 }
 
 impl Column {
@@ -64,7 +66,8 @@ struct Walk {
     columns: Vec<Column>,
     nodes: usize,
     buffers: usize,
-    /// Whether places are known: kinds whose number of buffers differs from batch to batch are behind which nothing is found.
+    views: usize,
+    /// Whether places are unknown: so many buffers as a kind that is not known has are stepped over by nobody.
     lost: bool,
 }
 
@@ -94,7 +97,7 @@ impl Walk {
             return Err(format!("expected at most {MAX_FIELDS} fields, found more"));
         }
         let kept = if self.lost { Kept::Other } else { kept };
-        self.columns.push(Column { name: name.to_owned(), kept });
+        self.columns.push(Column { name: name.to_owned(), kept, views: self.views });
         Ok(())
     }
 
@@ -185,9 +188,8 @@ impl Walk {
             Some(TypeRef::ListView(_) | TypeRef::LargeListView(_)) => (3, Kept::Other),
             Some(TypeRef::RunEndEncoded(_)) => (0, Kept::Other),
             Some(TypeRef::Utf8View(_) | TypeRef::BinaryView(_)) => {
-                self.add(name, Kept::Texts)?;
-                self.lost = true;
-                return Ok(());
+                self.views += 1;
+                (2, Kept::Texts)
             }
             _ => {
                 self.lost = true;

@@ -23,6 +23,7 @@ pub(super) const CONTINUED: [u8; 4] = [0xff; 4];
 const MAX_DESCRIPTION: usize = 64 << 20;
 /// Most batches of a file.
 const MAX_BATCHES: usize = 1_000_000;
+const NO_FIELDS: &str = "expected fields, found none";
 
 /// Where a batch lies: its message, the bytes of its description, and those of its numbers.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +41,7 @@ pub(super) struct Arrow {
     batches: Vec<Stretch>,
     /// First row of each batch, and the number of rows.
     starts: Vec<usize>,
+    is_cut: bool,
 }
 
 impl Arrow {
@@ -47,8 +49,8 @@ impl Arrow {
         let length = file.length().map_err(|e| e.to_string())?;
         let mut start = [0; 6];
         read_at(&mut file, 0, &mut start)?;
-        let (columns, batches) = match start == MARK {
-            true => of_file(&mut file, length)?,
+        let (columns, batches, is_cut) = match start == MARK {
+            true => of_file(&mut file, length).map(|(columns, batches)| (columns, batches, false))?,
             false => of_stream(&mut file, length)?,
         };
         let mut starts: Vec<usize> = vec![0];
@@ -57,7 +59,7 @@ impl Arrow {
             starts.push(starts[starts.len() - 1].checked_add(rows).ok_or("more rows than there can be")?);
         }
         let rows = starts[starts.len() - 1];
-        let mut arrow = Arrow { file, arrays: Vec::new(), columns, batches, starts };
+        let mut arrow = Arrow { file, arrays: Vec::new(), columns, batches, starts, is_cut };
         for k in 0..arrow.columns.len() {
             let column = &arrow.columns[k];
             let (name, holds) = (column.name.clone(), column.holds());
@@ -70,6 +72,11 @@ impl Arrow {
             arrow.arrays.push(Array { name, shape, holds, entries: Vec::new() });
         }
         Ok(arrow)
+    }
+
+    /// Whether a stream ends within a batch: it has the rows before that.
+    pub(super) fn is_cut(&self) -> bool {
+        self.is_cut
     }
 
     /// Length of the first list of a column that has entries.
@@ -156,7 +163,7 @@ fn of_file(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch>)
     let at = (length - 10).checked_sub(size as u64).ok_or("expected a list of the batches, found none")?;
     let bytes = description(file, at, size)?;
     let footer = FooterRef::read_as_root(&bytes).map_err(wrong)?;
-    let schema = footer.schema().map_err(wrong)?.ok_or("expected fields, found none")?;
+    let schema = footer.schema().map_err(wrong)?.ok_or(NO_FIELDS)?;
     let mut batches = Vec::new();
     for block in footer.record_batches().map_err(wrong)?.into_iter().flatten() {
         let whole = |x: i64| u64::try_from(x).map_err(|_| "expected a place within the file".to_owned());
@@ -169,10 +176,13 @@ fn of_file(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch>)
     Ok((of_schema(schema)?, batches))
 }
 
-/// Message by message.
-fn of_stream(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch>), String> {
+/// Message by message, and whether the last one is cut off. A stream may end with its last batch or with a mark behind it.
+fn of_stream(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch>, bool), String> {
     let (mut at, mut columns, mut batches) = (0, None, Vec::new());
-    while at + 8 <= length {
+    while at < length {
+        if at + 8 > length {
+            return Ok((columns.ok_or(NO_FIELDS)?, batches, true));
+        }
         let mut head = [0; 8];
         read_at(file, at, &mut head)?;
         let size = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
@@ -183,9 +193,16 @@ fn of_stream(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch
             break;
         }
         let described = size.saturating_add(8);
+        if at + described as u64 > length {
+            return Ok((columns.ok_or(NO_FIELDS)?, batches, true));
+        }
         let bytes = description(file, at + 8, size)?;
         let message = MessageRef::read_as_root(&bytes).map_err(wrong)?;
         let body = u64::try_from(message.body_length().map_err(wrong)?).map_err(|e| e.to_string())?;
+        let next = at.saturating_add(described as u64).saturating_add(body);
+        if next > length {
+            return Ok((columns.ok_or(NO_FIELDS)?, batches, true));
+        }
         match message.header().map_err(wrong)? {
             Some(MessageHeaderRef::Schema(schema)) => columns = Some(of_schema(schema)?),
             Some(MessageHeaderRef::RecordBatch(_)) => batches.push(Stretch { at, described, body }),
@@ -194,13 +211,9 @@ fn of_stream(file: &mut Opened, length: u64) -> Result<(Vec<Column>, Vec<Stretch
         if batches.len() > MAX_BATCHES {
             return Err(format!("expected at most {MAX_BATCHES} batches, found more"));
         }
-        at = at.saturating_add(described as u64).saturating_add(body);
+        at = next;
     }
-    // A stream that was cut off has the batches that are whole.
-    batches.retain(|stretch: &Stretch| {
-        stretch.at.saturating_add(stretch.described as u64).saturating_add(stretch.body) <= length
-    });
-    Ok((columns.ok_or("expected fields, found none")?, batches))
+    Ok((columns.ok_or(NO_FIELDS)?, batches, false))
 }
 
 fn wrong(error: planus::Error) -> String {

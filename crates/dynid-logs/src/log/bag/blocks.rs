@@ -1,9 +1,10 @@
 //! The messages of one topic as rows, so many at a time: a thread reads ahead of what is done with them.
 
 use std::ops::{ControlFlow, Range};
+use std::panic::resume_unwind;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use super::clock::Clock;
 use super::topics::Values as Message;
@@ -42,6 +43,7 @@ type Sent = Result<Table, LogFileError>;
 /// Rows of a bag that arrive from the thread that reads it.
 struct BagBlocks {
     receiver: Receiver<Sent>,
+    thread: Option<JoinHandle<()>>,
     name: String,
     paths: Vec<PathBuf>,
     notes: Vec<ReadingNote>,
@@ -57,30 +59,39 @@ pub(super) fn start(
 ) -> Result<Box<dyn TableBlocks>, LogFileError> {
     let (sender, receiver) = sync_channel(WAITING);
     let (name, paths, notes) = (log.name.clone(), log.paths.clone(), log.notes.clone());
-    let options = log.options.clone();
-    let part = Part::default();
     let reader = Reader {
         name: name.clone(),
-        options,
+        format: log.format,
+        options: log.options.clone(),
         layout,
         rows,
         per_block,
         missing,
         sender,
         row: 0,
-        part,
+        part: Part::default(),
         origins: None,
     };
     // The thread ends with the rows, or once nobody takes them any longer.
     let spawned = thread::Builder::new().spawn(move || reader.read(log));
-    spawned.map_err(|error| LogFileError::Unreadable { file: name.clone(), error })?;
-    Ok(Box::new(BagBlocks { receiver, name, paths, notes }))
+    let thread = spawned.map_err(|error| LogFileError::Unreadable { file: name.clone(), error })?;
+    Ok(Box::new(BagBlocks { receiver, thread: Some(thread), name, paths, notes }))
 }
 
 impl TableBlocks for BagBlocks {
     fn next_block(&mut self) -> Result<Option<Table>, LogFileError> {
-        // Nothing more comes once the thread has ended.
-        self.receiver.recv().ok().transpose()
+        if let Ok(sent) = self.receiver.recv() {
+            return sent.map(Some);
+        }
+        // Nothing more comes once the thread has ended: with the last row, unless it panicked.
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Err(panic)) => resume_unwind(panic),
+            _ => Ok(None),
+        }
+    }
+
+    fn notes(&self) -> &[ReadingNote] {
+        &self.notes
     }
 
     fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
@@ -99,6 +110,7 @@ struct Part {
 /// The thread's side.
 struct Reader {
     name: String,
+    format: &'static str,
     options: LogOptions,
     layout: Layout,
     rows: Range<usize>,
@@ -116,6 +128,7 @@ impl Reader {
     fn read(mut self, mut log: BagLog) {
         let topic = self.layout.topic;
         let read = log.each_of(topic, &mut |received, message| {
+            let Some(message) = message else { return ControlFlow::Continue(()) };
             self.take(received, &message);
             let is_last = self.row == self.rows.end;
             let flow = match is_last || self.part.receipt.len() == self.per_block {
@@ -124,10 +137,18 @@ impl Reader {
             };
             if is_last { ControlFlow::Break(()) } else { flow }
         });
-        if let Err(error) = read {
-            // Whoever waits is told; if nobody does there is nothing to tell.
-            drop(self.sender.send(Err(error)));
-        }
+        let fault = match read {
+            Err(error) => error,
+            // The messages were counted before.
+            Ok(_) if self.row < self.rows.end => {
+                let (expected, found) = (self.rows.end, self.row);
+                let reason = format!("expected {expected} messages, found {found}: the file has changed");
+                LogFileError::Damaged { file: self.name, format: self.format, reason }
+            }
+            Ok(_) => return,
+        };
+        // Whoever waits is told; if nobody does there is nothing to tell.
+        drop(self.sender.send(Err(fault)));
     }
 
     /// Sends the rows so far; a break if nobody waits for more, or if there is no going on.

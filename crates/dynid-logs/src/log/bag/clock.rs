@@ -1,5 +1,7 @@
 //! Two clocks of a bag: the stamps in the headers of messages, and the times of their receipt.
 
+use crate::log::ReadingNote;
+
 /// Clocks that differ by more than this between topics are not one clock, ns.
 const SAME_CLOCK_NS: f64 = 1e8;
 /// Share of messages that may be out of order.
@@ -97,6 +99,16 @@ impl Steps {
 pub(super) struct Choice {
     pub(super) clock: Clock,
     pub(super) reason: String,
+}
+
+impl Choice {
+    pub(super) fn note(&self) -> ReadingNote {
+        let clock = match self.clock {
+            Clock::Header => "stamps of headers",
+            Clock::Receipt => "times of receipt",
+        };
+        ReadingNote::new("clock", clock, self.reason.clone())
+    }
 }
 
 /// Which clock to use for some topics: stamps of headers, which do not know of the way to the recorder, unless they fail.

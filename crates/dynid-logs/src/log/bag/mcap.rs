@@ -6,9 +6,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use dynid_files::input::{self, Opened};
+use mcap::MAGIC;
 
 use super::file::{BagFile, End, RawMessage, Take, Topic, Waiting};
-use super::mcap_records::{self, Fields, MAGIC};
+use super::mcap_records::{self, Fields};
 
 /// Bytes that are read at a time.
 const BUFFER: usize = 1 << 18;

@@ -3,11 +3,11 @@
 use std::io::Read;
 use std::ops::ControlFlow;
 
+use mcap::MAGIC;
+
 use super::file::End;
 use crate::log::inflate;
 
-/// What a file begins and ends with.
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Largest chunk and record, bytes, compressed or not.
 const MAX_RECORD: usize = 512 << 20;
 /// Kind and length of a record.

@@ -265,11 +265,7 @@ impl LogSource for BagLog {
             out.add(&self.header.names[k], &values, 0, 1, is_time, missing)?;
         }
         let sha256 = digest(&self.name, &self.paths)?;
-        let clock = match choice.clock {
-            Clock::Header => "stamps of headers",
-            Clock::Receipt => "times of receipt",
-        };
-        self.notes.push(ReadingNote::new("clock", clock, choice.reason));
+        self.notes.push(choice.note());
         if read.len() > 1 {
             let names: Vec<&str> = read.keys().map(|k| self.topics[*k].name.as_str()).collect();
             let reason = format!("{} have stamps of their own", listed(&names, 6));
@@ -288,6 +284,7 @@ impl LogSource for BagLog {
         let (slots, slot_of) = self.slots(&columns);
         let [(topic, own)] = slots.iter().collect::<Vec<_>>()[..] else { return one_block(self, wanted) };
         let Some(read) = self.times_of(*topic, own)? else { return one_block(self, wanted) };
+        self.note_late_columns(&slots);
         let choice = self.clock(&read, &times)?;
         let place = |k: &usize| match k {
             0 => Place::Stamp(choice.clock),
@@ -309,18 +306,23 @@ impl LogSource for BagLog {
             is_time: columns.iter().map(|k| *k < CLOCKS.len() || times.contains(k)).collect(),
             has_headers: !only.header.is_empty(),
         };
+        self.notes.push(choice.note());
         blocks::start(*self, layout, first - 1..last, rows.max(1), wanted.missing)
     }
 }
 
 impl BagLog {
-    /// Times of all messages of a topic; `None` if one of them lacks a wanted value.
+    /// Times of all messages of a topic; `None` if one of them lacks a wanted value or cannot be taken apart.
     fn times_of(&mut self, topic: usize, slots: &[Option<usize>]) -> Result<Option<Topics>, LogFileError> {
         let wanted = slots.iter().flatten().count();
         let is_wanted = |column: &usize| slots.get(*column).is_some_and(Option::is_some);
         let (mut header, mut receipt) = (Stamps::default(), Stamps::default());
         let (mut lacks, mut headers) = (false, true);
         let scanned = self.each_of(topic, &mut |received, values| {
+            let Some(values) = values else {
+                lacks = true;
+                return ControlFlow::Break(());
+            };
             let all = values.numbers.iter().zip(values.columns);
             lacks |= all.filter(|(x, column)| is_wanted(column) && !x.is_nan()).count() != wanted;
             receipt.push(received);
@@ -336,11 +338,11 @@ impl BagLog {
         Ok((!lacks).then(|| [(topic, TopicRows { times, ..TopicRows::default() })].into()))
     }
 
-    /// Hands over the messages of a topic that can be taken apart: the time of receipt and the values.
+    /// Hands over the messages of a topic: the time of receipt, and the values unless they cannot be taken apart.
     fn each_of(
         &mut self,
         topic: usize,
-        take: &mut dyn FnMut(i64, Values<'_>) -> ControlFlow<()>,
+        take: &mut dyn FnMut(i64, Option<Values<'_>>) -> ControlFlow<()>,
     ) -> Result<Vec<End>, LogFileError> {
         let (mut ends, mut is_done) = (Vec::new(), false);
         for (place, source) in self.files.iter().enumerate() {
@@ -348,8 +350,7 @@ impl BagLog {
             let wanted: Vec<u32> = self.channels.iter().filter(own).map(|((_, c), _)| *c).collect();
             let decoded = &mut self.topics[topic];
             let end = source.messages(&wanted, &mut |message| {
-                let Ok(values) = decoded.decode(message.data) else { return ControlFlow::Continue(()) };
-                let flow = take(message.received, values);
+                let flow = take(message.received, decoded.decode(message.data).ok());
                 is_done = flow.is_break();
                 flow
             });

@@ -301,6 +301,10 @@ impl TableBlocks for TextBlocks {
         }))
     }
 
+    fn notes(&self) -> &[ReadingNote] {
+        &self.text.layout.notes
+    }
+
     fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
         let mut notes = self.text.layout.notes;
         if let LineParser::Echo(echo) = &self.rows.parser
