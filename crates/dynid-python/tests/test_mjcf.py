@@ -162,9 +162,9 @@ def test_springs_are_identified_and_put_back(angle: str, tmp_path: Path) -> None
     as_stated = plain(tmp_path / "arm.xml")
     tau = efforts(as_stated, still, v * [1, 0], a * [1, 0])
     found = dynid.identify(robot, dynid.Log(motion.t, still, tau, joints=robot.joints), elements={"default": ["viscous"], "friction": "given"})
-    other, rest = q[::-1] * [-0.5, 0] + [0.2, 0.3], np.zeros_like(q)
-    theirs = efforts(as_stated, other, rest, rest)
-    assert np.abs(found.predict(other, rest, rest) - theirs).max() < 1e-3 * np.abs(theirs).max()
+    other, at_rest = q[::-1] * [-0.5, 0] + [0.2, 0.3], np.zeros_like(q)
+    theirs = efforts(as_stated, other, at_rest, at_rest)
+    assert np.abs(found.predict(other, at_rest, at_rest) - theirs).max() < 1e-3 * np.abs(theirs).max()
 
 
 @pytest.mark.filterwarnings("ignore::dynid.DynidWarning")
