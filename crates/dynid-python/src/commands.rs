@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use dynid::compare::compare_logs;
 use dynid::config::Config;
 use dynid::design::{DesignConfig, DesignStep, design as run_design};
+use dynid::friction::{FrictionConfig, FrictionStep, friction_of_logs};
 use dynid::gains::gains_of_logs;
 use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
@@ -94,6 +95,38 @@ pub(crate) fn gains(
         Ok(gains_of_logs(own, logs, &settings, &mut |step| tell(step.to_string()))?.file())
     })?;
     as_json(&file)
+}
+
+/// Friction of single joints from logs of constant speeds and of pre-sliding: the record as JSON, and the page.
+#[pyfunction]
+#[pyo3(signature = (robot, logs, presliding, settings_json, *, progress=None, threads=0))]
+pub(crate) fn friction(
+    py: Python<'_>,
+    robot: &Robot,
+    logs: Vec<PyRef<'_, Log>>,
+    presliding: Vec<PyRef<'_, Log>>,
+    settings_json: &str,
+    progress: Option<Bound<'_, PyAny>>,
+    threads: usize,
+) -> PyResult<(String, String)> {
+    let config: FrictionConfig = parsed(py, settings_json, "settings of friction")?;
+    let own = robot.robot.clone();
+    let [logs, presliding] =
+        [logs, presliding].map(|given| given.iter().map(|l| (**l).clone()).collect::<Vec<Log>>());
+    work::run(py, progress, threads, move |tell| {
+        let of =
+            |given: &[Log]| given.iter().map(|log| log.of(&own.axes, false)).collect::<Result<Vec<_>, _>>();
+        let (logs, presliding) = (of(&logs)?, of(&presliding)?);
+        let found = friction_of_logs(own, logs, presliding, &config, &mut |step| {
+            tell(match step {
+                FrictionStep::Read(log) => format!("reading {log}"),
+                FrictionStep::Law(joint) => format!("fitting the law of {joint}"),
+                FrictionStep::Presliding(joint) => format!("searching the bristles of {joint}"),
+            });
+        })?;
+        let model = found.model(&config)?;
+        Ok((model.to_json(), found.report(&model)?))
+    })
 }
 
 /// The record as JSON, the page, and files by name and text.

@@ -2,6 +2,7 @@
 
 use std::ffi::CString;
 
+use dynid::friction::FrictionError;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::{PyTypeInfo, create_exception};
@@ -71,7 +72,12 @@ pub(crate) fn raise(py: Python<'_>, error: &dynid::Error) -> PyErr {
         | E::Cutoff { .. } => SettingError::type_object(py),
         E::EstimateFile { .. } | E::Reduction(_) | E::Checkpoint { .. } => EstimateError::type_object(py),
         E::Unsupported(_) => UnsupportedError::type_object(py),
-        _ => DynidError::type_object(py),
+        _ => match error.job::<FrictionError>() {
+            Some(FrictionError::Law { .. }) => SettingError::type_object(py),
+            Some(FrictionError::File { .. }) => EstimateError::type_object(py),
+            Some(_) => LogError::type_object(py),
+            None => DynidError::type_object(py),
+        },
     };
     with_hint(py, kind, error.to_string(), error.hint())
 }

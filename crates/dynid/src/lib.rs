@@ -37,7 +37,7 @@ pub use dynid_config::{Config, FrictionModel, config, fault, friction_model, log
 pub use dynid_drives as servo;
 pub use dynid_experiments::{design, motions, simulate};
 
-pub use friction::{FrictionConfig, identify_friction};
+pub use friction::{FrictionConfig, friction_of_logs, identify_friction};
 pub use identify::identify;
 pub use report_data::report as report_page;
 pub use run::Run;

@@ -16,6 +16,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 from . import examples
 from ._commands import Comparison, Design, Gains, Online, check, compare, design, gains
 from ._estimate import Estimate, Factor, identify, identify_file
+from ._friction import Friction, FrictionLog, PreslidingLog, friction
 from ._fleet import FactorStore, Fleet, ManifestRow, fleet, read_manifest, reduce_log
 from ._descriptions import robot_description
 from ._log import Log, Simulation, find_logs, read_columns, simulate
@@ -44,11 +45,14 @@ __all__ = [
     "Factor",
     "FactorStore",
     "Fleet",
+    "Friction",
+    "FrictionLog",
     "Gains",
     "Log",
     "LogError",
     "ManifestRow",
     "Online",
+    "PreslidingLog",
     "Robot",
     "RobotError",
     "Servo",
@@ -63,6 +67,7 @@ __all__ = [
     "examples",
     "find_logs",
     "fleet",
+    "friction",
     "gains",
     "identify",
     "identify_file",

@@ -202,6 +202,15 @@ def compare(
 def gains(
     robot: Robot, logs: list[Log], settings_json: str, *, progress: Callable[[str], object] | None = None, threads: int = 0
 ) -> str: ...
+def friction(
+    robot: Robot,
+    logs: list[Log],
+    presliding: list[Log],
+    settings_json: str,
+    *,
+    progress: Callable[[str], object] | None = None,
+    threads: int = 0,
+) -> tuple[str, str]: ...
 def servo(
     config: str, *, progress: Callable[[str], object] | None = None, threads: int = 0
 ) -> tuple[str, str, list[tuple[str, str]]]: ...

@@ -253,6 +253,17 @@ pub struct PreslidingLog {
     pub columns: Option<MappingSpec>,
 }
 
+impl PreslidingLog {
+    pub(super) fn plain(&self) -> LogConfig {
+        LogConfig {
+            path: self.path.clone(),
+            rows: self.rows,
+            columns: self.columns.clone(),
+            ..LogConfig::default()
+        }
+    }
+}
+
 /// Bristles as known before.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

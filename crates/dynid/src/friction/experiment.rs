@@ -6,11 +6,11 @@ use dynid_motion::clock::{ClockSettings, UniformLog, uniform};
 use dynid_motion::constant_speed::{Pairing, Pass, Segment, at_rest, pair, segments, speed};
 
 use super::config::{FrictionConfig, FrictionLog, LoggedSignal, ThermalLines};
+use crate::Error;
 use crate::estimate::InputRecord;
 use crate::friction_model::FrictionError;
 use crate::log::Log;
 use crate::robot::Robot;
-use crate::{Error, logs};
 
 /// Samples of one pass at constant speed.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,14 +83,15 @@ fn paths(robot: &Robot, joint: &str) -> Vec<String> {
     notes.into_iter().filter(|(applies, _)| *applies).map(|(_, note)| note.to_owned()).collect()
 }
 
-/// Reads all logs of steady tests. Joints come in the robot's order, those without a pass or signal left out.
+/// Takes all logs of steady tests, one after the other. Joints come in the robot's order, those without a pass or signal left out.
 pub(super) fn read(
     config: &FrictionConfig,
     robot: &Robot,
     (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
-    progress: &mut dyn FnMut(String),
+    load: &mut dyn FnMut(&FrictionLog) -> Result<Log, Error>,
 ) -> Result<Vec<JointExperiment>, Error> {
     let names = driven(robot);
+    let mut first = None;
     let of = |joint: &String| JointExperiment {
         joint: joint.clone(),
         notes: paths(robot, joint),
@@ -98,11 +99,8 @@ pub(super) fn read(
     };
     let mut joints: Vec<JointExperiment> = names.iter().map(of).collect();
     for log in &config.log {
-        progress(log.path.display().to_string());
-        if let Some(name) = log.joint.as_ref().filter(|j| !names.contains(j)) {
-            return Err(Error::UnknownJoint { name: name.clone(), known: names.clone() });
-        }
-        let loaded = logs::load(&log.plain(), &robot.axes, &config.columns, None)?;
+        let loaded = load(log)?;
+        first.get_or_insert_with(|| (loaded.log.name().to_owned(), log.joint.clone()));
         inputs.extend(loaded.source.inputs.iter().cloned());
         warnings.extend(crate::log::temperature_warnings(&loaded.log));
         match log.signal {
@@ -125,11 +123,11 @@ pub(super) fn read(
     }
     joints.retain(|j| !j.passes.is_empty() || !j.series.is_empty());
     if joints.is_empty() {
-        let log = &config.log[0];
+        let (file, joint) = first.unwrap_or_default();
         return Err(FrictionError::NoConstantSpeed {
-            file: log.path.display().to_string(),
+            file,
             logs: config.log.len(),
-            joint: log.joint.clone(),
+            joint,
             least_duration_s: config.constant_speed.least_duration_s,
         }
         .into());

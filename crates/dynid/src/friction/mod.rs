@@ -28,9 +28,10 @@ pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 
 use dynid_friction::steady_friction::{SteadyError, SteadyFriction, analyse};
 
-use crate::Error;
 use crate::estimate::InputRecord;
+use crate::log::Log;
 use crate::robot::{Robot, RobotOptions, refuse_elastic};
+use crate::{Error, logs};
 
 /// What is being worked on.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,27 +68,94 @@ pub struct FrictionIdentification {
     pub inputs: Vec<InputRecord>,
 }
 
+/// An entry of the configuration whose log is wanted.
+#[derive(Debug, Clone, Copy)]
+enum Entry<'a> {
+    Steady(&'a FrictionLog),
+    Presliding(&'a PreslidingLog),
+}
+
+/// Gives the log of an entry; entries are asked for in their order.
+type Load<'a> = dyn FnMut(Entry<'_>, &mut dyn FnMut(FrictionStep)) -> Result<Log, Error> + 'a;
+
 /// Reads robot and logs, finds points, laws and bristles.
 ///
 /// # Errors
-/// [`Error`]: bad input, among it no stretch of constant speed in any log, and thermal lines that are required but
-/// impossible. One direction only, too few speeds and coarse encoders are results that say so.
+/// As [`friction_of_logs`], and for files that cannot be read.
 pub fn identify_friction(
     config: &FrictionConfig,
     progress: &mut dyn FnMut(FrictionStep),
 ) -> Result<FrictionIdentification, Error> {
     config.check()?;
     let robot = Robot::load(&config.robot, &RobotOptions::default())?;
+    let axes = robot.axes.clone();
+    let mut load = |entry: Entry<'_>, progress: &mut dyn FnMut(FrictionStep)| {
+        let file = match entry {
+            Entry::Steady(log) => {
+                progress(FrictionStep::Read(log.path.display().to_string()));
+                log.plain()
+            }
+            Entry::Presliding(log) => log.plain(),
+        };
+        logs::load(&file, &axes, &config.columns, None)
+    };
+    of_entries(robot, config, &mut load, progress)
+}
+
+/// Finds points, laws and bristles from logs that need not come from files. `steady` and `presliding`: those of `log` and `presliding` of the
+/// configuration, in their order; its paths, rows and columns count for nothing here.
+///
+/// # Errors
+/// [`Error`]: bad input, among it another number of logs than of entries, no stretch of constant speed in any log, and thermal lines that are
+/// required but impossible. One direction only, too few speeds and coarse encoders are results that say so.
+pub fn friction_of_logs(
+    robot: Robot,
+    steady: Vec<Log>,
+    presliding: Vec<Log>,
+    config: &FrictionConfig,
+    progress: &mut dyn FnMut(FrictionStep),
+) -> Result<FrictionIdentification, Error> {
+    config.check()?;
+    if steady.is_empty() {
+        return Err(Error::setting("log", "at least one log of a friction test", 0));
+    }
+    for (name, entries, logs) in
+        [("log", config.log.len(), steady.len()), ("presliding", config.presliding.len(), presliding.len())]
+    {
+        if entries != logs {
+            return Err(Error::setting(name, &format!("an entry for each of {logs} logs"), entries));
+        }
+    }
+    let (mut steady, mut presliding) = (steady.into_iter(), presliding.into_iter());
+    let mut load = |entry: Entry<'_>, _: &mut dyn FnMut(FrictionStep)| {
+        let next = match entry {
+            Entry::Steady(_) => steady.next(),
+            Entry::Presliding(_) => presliding.next(),
+        };
+        Ok(next.unwrap_or_else(|| unreachable!("as many logs as entries, each asked for once")))
+    };
+    of_entries(robot, config, &mut load, progress)
+}
+
+fn of_entries(
+    robot: Robot,
+    config: &FrictionConfig,
+    load: &mut Load<'_>,
+    progress: &mut dyn FnMut(FrictionStep),
+) -> Result<FrictionIdentification, Error> {
     refuse_elastic(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
     let mut inputs = robot.inputs();
     let known = experiment::driven(&robot);
-    if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
+    let named = config.prior.keys().chain(config.presliding.iter().map(|log| &log.joint));
+    if let Some(name) =
+        named.chain(config.log.iter().filter_map(|log| log.joint.as_ref())).find(|j| !known.contains(j))
+    {
         return Err(Error::UnknownJoint { name: name.clone(), known });
     }
-    let experiments = experiment::read(config, &robot, (&mut warnings, &mut inputs), &mut |file| {
-        progress(FrictionStep::Read(file))
+    let experiments = experiment::read(config, &robot, (&mut warnings, &mut inputs), &mut |log| {
+        load(Entry::Steady(log), progress)
     })?;
     let mut joints = Vec::with_capacity(experiments.len());
     for experiment in experiments {
@@ -99,7 +167,8 @@ pub fn identify_friction(
         progress(FrictionStep::Presliding(log.joint.clone()));
         let joint = joints.iter_mut().find(|j| j.experiment.joint == log.joint);
         let law = joint.as_ref().and_then(|j| j.law.as_ref().ok()).map(|l| &l.law);
-        let fit = presliding::find(config, log, &robot, law, (&mut warnings, &mut inputs))?;
+        let loaded = load(Entry::Presliding(log), progress)?;
+        let fit = presliding::find(config, log, &loaded, law, (&mut warnings, &mut inputs))?;
         if let Some(joint) = joint {
             joint.presliding.push(fit);
         }

@@ -9,10 +9,10 @@ use dynid_sim::presliding::{EffortHold, PreslidingJoint, SteadyTable, presliding
 
 use super::config::{FrictionConfig, HoldName, PreslidingLog};
 use super::experiment::{on_grid, temperature};
+use crate::Error;
 use crate::estimate::{InputKind, InputRecord};
 use crate::friction_model::FrictionError;
-use crate::robot::Robot;
-use crate::{Error, logs};
+use crate::log::Log;
 
 /// Positions coarser than this share of the motion do not show its shape.
 const COARSE: f64 = 0.02;
@@ -75,26 +75,15 @@ pub struct PreslidingTest<'a> {
 pub(super) fn find(
     config: &FrictionConfig,
     log: &PreslidingLog,
-    robot: &Robot,
+    loaded: &Log,
     law: Option<&FrictionLaw>,
     (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
 ) -> Result<PreslidingFit, Error> {
-    let file = log.path.display().to_string();
-    let known = super::experiment::driven(robot);
-    if !known.contains(&log.joint) {
-        return Err(Error::UnknownJoint { name: log.joint.clone(), known });
-    }
-    let plain = crate::config::LogConfig {
-        path: log.path.clone(),
-        rows: log.rows,
-        columns: log.columns.clone(),
-        ..crate::config::LogConfig::default()
-    };
-    let loaded = logs::load(&plain, &robot.axes, &config.columns, None)?;
+    let file = loaded.log.name().to_owned();
     let presliding = |input: &InputRecord| InputRecord { kind: InputKind::Presliding, ..input.clone() };
     inputs.extend(loaded.source.inputs.iter().map(presliding));
     warnings.extend(crate::log::temperature_warnings(&loaded.log));
-    let grid = on_grid(&loaded)?;
+    let grid = on_grid(loaded)?;
     let unknown = || FrictionError::NoSteadyLaw { file: file.clone(), joint: log.joint.clone() };
     let signals = grid.joints.iter().find(|j| j.name == log.joint).ok_or_else(unknown)?;
     let law = law.ok_or_else(unknown)?;
