@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use dynid_logs::MappingSpec;
 use dynid_model::element::ElementRegistry;
-use dynid_robots::{CouplingForm, TieSpec};
+use dynid_robots::{CouplingForm, LawSpec, TieSpec};
 use serde::{Deserialize, Serialize};
 
 use dynid_identify::Error;
@@ -53,6 +53,8 @@ pub struct Config {
     pub locked: BTreeMap<String, f64>,
     /// Elements per joint.
     pub elements: ElementsConfig,
+    /// Laws of friction that are stated by formulas, besides those of the robot file; `[elements]` may name them.
+    pub law: BTreeMap<String, LawSpec>,
     /// Couplings of joints, besides those of the robot file.
     pub coupling: Vec<CouplingConfig>,
     /// Parameters that are known, or multiples or sums of others, besides those of the robot file; a list of names says that they are equal.

@@ -35,7 +35,9 @@ impl Config {
             floating_base: false,
             locked: self.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
         };
-        Ok(Robot::load(&self.robot, &options)?.with_registry(self.registry.clone()))
+        let robot = Robot::load(&self.robot, &options)?;
+        let registry = robot.elements.registry.clone().and(&self.registry);
+        Ok(robot.with_registry(registry))
     }
 
     /// Reads the training logs of a configuration.

@@ -69,6 +69,7 @@ pub(crate) fn raise(py: Python<'_>, error: &dynid::Error) -> PyErr {
         | E::UnknownLink { .. }
         | E::UnknownParameter { .. }
         | E::Tie { .. }
+        | E::Law { .. }
         | E::Cutoff { .. } => SettingError::type_object(py),
         E::EstimateFile { .. } | E::Reduction(_) | E::Checkpoint { .. } => EstimateError::type_object(py),
         E::Unsupported(_) => UnsupportedError::type_object(py),

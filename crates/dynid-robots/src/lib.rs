@@ -4,6 +4,7 @@
 //! typed error whose `Display` is one line (file, line, column, expected, found) and whose `hint()` says what
 //! to do about it. Whether links and joints form a mechanism is decided by `dynid_model`, not here.
 
+mod law;
 pub mod mesh;
 pub mod mjcf;
 mod plain;
@@ -18,6 +19,7 @@ pub mod urdf;
 mod xacro;
 mod xacro_fault;
 
+pub use law::{LawColumn, LawFault, LawShape, LawSpec, LawUnit, with_laws};
 pub use mesh::{Mesh, MeshError};
 pub use robot_error::{Place, RobotFileError};
 pub use tie::{MirrorAxis, TieFault, TieSpec};

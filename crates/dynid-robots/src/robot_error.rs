@@ -5,6 +5,7 @@ use std::io;
 
 use thiserror::Error;
 
+use crate::law::LawFault;
 use crate::xacro_fault::XacroFault;
 
 /// A place in a text file, printed `file:line:column`.
@@ -159,6 +160,16 @@ pub enum RobotFileError {
         /// What stands there.
         found: String,
     },
+    /// A law of the file's own cannot be one.
+    #[error("{at}: law `{name}`: {fault}")]
+    Law {
+        /// Where it stands.
+        at: Place,
+        /// Its name.
+        name: String,
+        /// Why.
+        fault: Box<LawFault>,
+    },
     /// A name is used twice.
     #[error("{at}: expected every {kind} name once, found `{name}` again (first on line {first_line})")]
     Duplicate {
@@ -255,6 +266,7 @@ impl RobotFileError {
             E::Missing { expected, .. } if expected.contains("<mass>") || expected.contains("<inertia>") => {
                 "complete the <inertial> or remove it: a link without one counts as not stated".into()
             }
+            E::Law { .. } => LawFault::HINT.into(),
             E::Missing { .. } => "add it".into(),
             E::Repeated { .. } => "remove one of them".into(),
             E::Value { found, .. } if found.contains(',') => {

@@ -247,6 +247,14 @@ pub enum Error {
         /// Why, in words.
         fault: String,
     },
+    /// A law that is stated by formulas cannot be one.
+    #[error("law `{name}`: {fault}")]
+    Law {
+        /// Its name.
+        name: String,
+        /// Why.
+        fault: Box<dynid_robots::LawFault>,
+    },
     /// The linear estimator has no estimate.
     #[error("estimator: {0}")]
     Linear(#[from] dynid_estimate::linear::LinearError),
@@ -536,6 +544,7 @@ impl Error {
             Error::UnknownParameter { .. } => {
                 Some("`dynid inspect ROBOT` lists links and joints; parameters are `<link>.Izz`, `<joint>.fc`".to_owned())
             }
+            Error::Law { .. } => Some(dynid_robots::LawFault::HINT.to_owned()),
             Error::Tie { .. } => Some(
                 "`[[tie]]` has `equal = [\"j1\", \"j2\"]`, `ratio = { \"j1.fc\" = 1, \"j2.fc\" = 2 }`, `sum = { \"a.m\" = 1, \"b.m\" = 1 }` with `value`, \
                  `known = { \"a.m\" = 2.5 }` or `massless = [\"a\"]`"

@@ -41,6 +41,7 @@ impl Config {
             settings.estimator = self.estimator.clone();
             settings.closed_loop = self.instruments.as_ref().map(InstrumentsConfig::closed_loop);
             settings.bound = self.bound.clone();
+            settings.law = self.law.clone();
             settings.tie = self.tie.clone();
             settings.preferred = self.preferred.clone();
             settings.payload = self.payload.clone();

@@ -10,7 +10,7 @@ use dynid_model::{
 };
 use dynid_robots::{
     ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
-    ReactionSpec, RobotFile, SettingValue, TieSpec,
+    LawSpec, ReactionSpec, RobotFile, SettingValue, TieSpec,
 };
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +37,9 @@ pub struct ModelRecord {
     pub loops: Option<LoopsRecord>,
     /// Element names per effort; per rate of the tree where loops are closed.
     pub elements: Vec<Vec<String>>,
+    /// Laws of friction among these elements that formulas state, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub laws: BTreeMap<String, LawSpec>,
     /// Couplings.
     pub couplings: Vec<CouplingRecord>,
     /// Joints that motors drive through springs; their stiffness is among the parameters.
@@ -238,7 +241,11 @@ impl ModelRecord {
                 Some((s.joint.clone(), s.element.clone(), s.key.clone(), value))
             })
             .collect();
+        let named = |name: &str| plan.per_rate.iter().any(|list| list.iter().any(|element| element == name));
+        let laws = plan.registry().kinds().filter(|kind| named(kind.name));
+        let laws = laws.filter_map(|kind| Some((kind.name.to_owned(), LawSpec::of(kind)?))).collect();
         ModelRecord {
+            laws,
             gravity: mechanism.gravity().0,
             floating_base: description.floating_base,
             couple_mimics: description.couple_mimics,
@@ -288,7 +295,8 @@ impl ModelRecord {
     /// # Errors
     /// What contradicts itself, in words.
     pub(crate) fn robot_file(&self, name: &str) -> Result<RobotFile, String> {
-        let elements = ElementSpec { registry: self.registry.clone(), ..ElementSpec::default() };
+        let registry = self.kinds().map_err(|e| e.to_string())?;
+        let elements = ElementSpec { registry, ..ElementSpec::default() };
         let mut file = RobotFile::plain(self.description(name)?, elements);
         if let Some(loops) = &self.loops {
             file.closures = loops.descriptions()?;
@@ -326,7 +334,7 @@ impl ModelRecord {
         if let Some(joint) = repeated(mechanism, &elastic) {
             return Err(Error::setting("elastic", "names that occur once", joint));
         }
-        let registry = self.registry.clone();
+        let registry = self.kinds()?;
         let reactions = self.reactions.clone();
         let ties = self.ties.clone();
         let clearance = self.clearances()?;
@@ -342,6 +350,12 @@ impl ModelRecord {
 }
 
 impl ModelRecord {
+    /// The kinds of elements, with the laws that the record states.
+    fn kinds(&self) -> Result<ElementRegistry, Error> {
+        let with = dynid_robots::with_laws(self.registry.clone(), &self.laws);
+        with.map_err(|(name, fault)| Error::Law { name, fault })
+    }
+
     fn clearances(&self) -> Result<Vec<ClearanceSpec>, Error> {
         let of = |record: &ClearanceRecord| {
             ClearanceSpec::of("model.clearance", &record.joint, &record.keys)

@@ -10,6 +10,7 @@ mod cyclic;
 mod drive;
 mod elastic;
 mod external_load;
+mod formula;
 mod friction;
 mod gated;
 mod jets;
@@ -31,6 +32,7 @@ pub use cyclic::Cyclic;
 pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
 pub use external_load::{ExternalLoad, load_channel};
+pub use formula::{FormulaFault, FormulaLaw, FormulaLawFault, FormulaTerms, RESERVED, kept};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, JournalFriction,
     LoadFriction, LuGre, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck,

@@ -13,6 +13,7 @@ use super::elastic::{self, ElasticSpec};
 use super::number::number;
 use super::reaction::{self, ReactionSpec};
 use super::schema::{CouplingForm, RobotToml};
+use crate::law::with_laws;
 use crate::robot_error::RobotFileError;
 use crate::tie::TieSpec;
 
@@ -103,6 +104,12 @@ pub(super) fn build(
     description: &Description,
 ) -> Result<ElementSpec, RobotFileError> {
     let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
+    for (name, law) in &robot.law {
+        let (offset, law) = (law.span().start, law.get_ref().clone());
+        let laws = [(name.clone(), law)].into();
+        spec.registry =
+            with_laws(spec.registry, &laws).map_err(|(name, fault)| source.law(offset, &name, fault))?;
+    }
     spec.elastic = elastic::build(source, robot, joints)?;
     spec.clearance = clearance::build(source, robot, description)?;
     let (reactions, flags) = reaction::build(source, robot, description)?;

@@ -29,6 +29,7 @@ use toml::Spanned;
 
 pub use write::Loops;
 
+use crate::law::LawFault;
 use crate::plain::Plain;
 use crate::robot_error::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
@@ -236,6 +237,10 @@ impl Source<'_> {
             expected: expected.to_owned(),
             found: excerpt(found),
         }
+    }
+
+    fn law(&self, offset: usize, name: &str, fault: Box<LawFault>) -> RobotFileError {
+        RobotFileError::Law { at: self.place(offset), name: excerpt(name), fault }
     }
 
     fn known(

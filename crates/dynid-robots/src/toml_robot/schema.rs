@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::number::{Angle, Number, Position};
+use crate::law::LawSpec;
 use crate::tie::TieSpec;
 
 #[derive(Deserialize)]
@@ -52,6 +53,9 @@ pub(super) struct RobotToml {
     /// Elements of single joints, `elements = [..]`, and stated values of elements.
     #[serde(default)]
     pub(super) element: BTreeMap<String, Spanned<toml::Table>>,
+    /// Laws of friction of the file's own, which `elements` may name.
+    #[serde(default)]
+    pub(super) law: BTreeMap<String, Spanned<LawSpec>>,
     /// Joints that share motors.
     #[serde(default)]
     pub(super) coupling: Vec<Spanned<Coupling>>,

@@ -1,7 +1,7 @@
 //! Elements of a robot in a run.
 
 use dynid_files::closest;
-use dynid_robots::{CouplingSpec, TieSpec};
+use dynid_robots::{CouplingSpec, TieSpec, with_laws};
 
 use super::Robot;
 use crate::Error;
@@ -23,6 +23,8 @@ impl ElementPlan {
         moves: impl Fn(usize) -> bool,
     ) -> Result<ElementPlan, Error> {
         let mut spec = robot.elements.clone();
+        spec.registry =
+            with_laws(spec.registry, &settings.law).map_err(|(name, fault)| Error::Law { name, fault })?;
         for (joint, list) in &settings.elements.joint {
             spec.per_joint.retain(|(j, _)| j != joint);
             spec.per_joint.push((joint.clone(), list.clone()));

@@ -12,7 +12,7 @@ mod search;
 
 use std::collections::BTreeMap;
 
-use dynid_robots::{CouplingSpec, TieFault, TieSpec};
+use dynid_robots::{CouplingSpec, LawSpec, TieFault, TieSpec};
 use serde::Serialize;
 
 use dynid_estimate::linear::OwnEstimator;
@@ -41,6 +41,9 @@ pub struct Settings {
     pub seed: Option<u64>,
     /// Elements of joints.
     pub elements: Elements,
+    /// Laws of friction that are stated by formulas, besides those of the robot; lists of elements name them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub law: BTreeMap<String, LawSpec>,
     /// Couplings of joints, besides those of the robot.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub couplings: Vec<CouplingSpec>,

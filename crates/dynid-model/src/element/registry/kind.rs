@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::element::formula::{FormulaAtJoint, FormulaLaw, kept};
 use crate::element::{AtJoint, JointElement, LinearTerm, ShapeSetting, ShapeTerm, VelocityLaw};
 
 /// A kind of element: all that is known of it before it stands at a joint.
@@ -34,6 +35,8 @@ pub struct ElementKind {
     pub alike: Vec<(&'static str, &'static str)>,
     /// Where it is a candidate that held-out blocks may ask for.
     pub candidate: Option<Candidate>,
+    /// The law, where it is stated by formulas.
+    pub formula: Option<Arc<FormulaLaw>>,
     pub(super) build: Build,
 }
 
@@ -160,6 +163,16 @@ impl<L: VelocityLaw<N, M> + Clone + 'static, const N: usize, const M: usize> Law
     }
 }
 
+impl Law for FormulaLaw {
+    fn at(&self, placement: &Placement<'_>) -> Box<dyn JointElement> {
+        Box::new(FormulaAtJoint {
+            rate: placement.rate,
+            law: Arc::new(self.clone()),
+            shape: placement.shape.to_vec(),
+        })
+    }
+}
+
 impl ElementKind {
     /// A law of velocity. A setting with the symbol of a coefficient states its value; one law of friction for all joints takes
     /// its place, if it is friction.
@@ -172,6 +185,27 @@ impl ElementKind {
         let (shape, friction) = (law.shape().to_vec(), law.is_friction());
         let build = Build::Law(Arc::new(Placeable(law)));
         ElementKind { linear, shape, stated, friction, gives_way: friction, ..Self::bare(name, build) }
+    }
+
+    /// A law of velocity that is stated by formulas. As [`ElementKind::law`].
+    pub fn formula(name: &str, law: FormulaLaw) -> Self {
+        let terms = law.terms();
+        let linear: Vec<LinearTerm> = terms.columns.iter().map(|(term, _)| *term).collect();
+        let stated = linear.iter().map(|term| StatedTerm { key: term.symbol, symbol: term.symbol }).collect();
+        let (shape, friction) = (terms.shape.clone(), terms.is_friction);
+        let equation = kept(&law.equation());
+        let law = Arc::new(law);
+        let bare = Self::bare(kept(name), Build::Law(law.clone()));
+        ElementKind {
+            linear,
+            shape,
+            stated,
+            friction,
+            gives_way: friction,
+            equation,
+            formula: Some(law),
+            ..bare
+        }
     }
 
     pub(super) fn bare(name: &'static str, build: Build) -> Self {
@@ -189,6 +223,7 @@ impl ElementKind {
             excludes: Vec::new(),
             alike: Vec::new(),
             candidate: None,
+            formula: None,
             build,
         }
     }

@@ -82,6 +82,18 @@ impl ElementRegistry {
         Ok(ElementRegistry { kinds: Arc::new(kinds) })
     }
 
+    /// Returns the registry with those kinds of another one whose names it has not.
+    #[must_use]
+    pub fn and(self, other: &ElementRegistry) -> Self {
+        let new: Vec<ElementKind> =
+            other.kinds().filter(|kind| self.kind(kind.name).is_none()).cloned().collect();
+        if new.is_empty() {
+            return self;
+        }
+        let kinds = self.kinds.iter().cloned().chain(new).collect();
+        ElementRegistry { kinds: Arc::new(kinds) }
+    }
+
     /// All kinds.
     pub fn kinds(&self) -> impl Iterator<Item = &ElementKind> {
         self.kinds.iter()

@@ -1,0 +1,355 @@
+//! Formulas of one velocity: text to a program, run on any [`Scalar`].
+
+use dynid_algebra::scalar::Scalar;
+
+use crate::element::Velocity;
+
+/// Longest formula, bytes.
+const LONGEST: usize = 1000;
+/// Most numbers that wait for their operation: what a formula is deep.
+const DEEPEST: usize = 16;
+/// Largest whole exponent that is a product.
+const PRODUCT: f64 = 16.0;
+
+/// Names that a formula gives a meaning to, which no parameter can have.
+pub const RESERVED: [&str; 11] =
+    ["v", "T", "pi", "sign", "abs", "sqrt", "exp", "ln", "tanh", "atan", "logistic"];
+
+/// Why a formula cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{formula}`, character {place}: expected {expected}, found {found}")]
+pub struct FormulaFault {
+    /// The formula.
+    pub formula: String,
+    /// Where, characters from 1.
+    pub place: usize,
+    /// What was expected there.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Step {
+    Number(f64),
+    /// `v`.
+    Velocity,
+    /// `sign(v)`.
+    Sign,
+    /// `T`.
+    Temperature,
+    Shape(usize),
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Negate,
+    /// A whole power, as a product.
+    Whole(i32),
+    Power,
+    Call(Function),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Function {
+    Abs,
+    Sqrt,
+    Exp,
+    Ln,
+    Tanh,
+    Atan,
+    Logistic,
+}
+
+/// A formula in the velocity `v`, the temperature `T` and shape parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Formula {
+    steps: Vec<Step>,
+}
+
+impl Formula {
+    /// Reads a formula; `shape`: symbols of the shape parameters.
+    pub(super) fn parse(text: &str, shape: &[&str]) -> Result<Formula, FormulaFault> {
+        let mut reader = Reader { text, at: 0, shape, steps: Vec::new(), depth: 0 };
+        if text.len() > LONGEST {
+            return Err(reader.fault(&format!("at most {LONGEST} characters")));
+        }
+        reader.sum(0)?;
+        reader.space();
+        match reader.rest().is_empty() {
+            true => Ok(Formula { steps: reader.steps }),
+            false => Err(reader.fault("an operator or the end")),
+        }
+    }
+
+    /// Whether it reads the temperature.
+    pub(super) fn is_thermal(&self) -> bool {
+        self.steps.contains(&Step::Temperature)
+    }
+
+    /// Whether it reads a shape parameter.
+    pub(super) fn reads(&self, parameter: usize) -> bool {
+        self.steps.contains(&Step::Shape(parameter))
+    }
+
+    /// Its value.
+    pub(super) fn at<S: Scalar>(&self, v: Velocity<S>, shape: &[S]) -> S {
+        let mut stack = [S::zero(); DEEPEST];
+        let mut top = 0;
+        for step in &self.steps {
+            match *step {
+                Step::Number(x) => push(&mut stack, &mut top, S::from_f64(x)),
+                Step::Velocity => push(&mut stack, &mut top, v.value()),
+                Step::Sign => push(&mut stack, &mut top, v.sign()),
+                Step::Temperature => push(&mut stack, &mut top, v.temperature()),
+                Step::Shape(k) => push(&mut stack, &mut top, shape[k]),
+                Step::Negate => stack[top - 1] = -stack[top - 1],
+                Step::Whole(exponent) => stack[top - 1] = whole(stack[top - 1], exponent),
+                Step::Call(function) => stack[top - 1] = call(function, stack[top - 1]),
+                Step::Add | Step::Subtract | Step::Multiply | Step::Divide | Step::Power => {
+                    let (a, b) = (stack[top - 2], stack[top - 1]);
+                    top -= 1;
+                    stack[top - 1] = match step {
+                        Step::Add => a + b,
+                        Step::Subtract => a - b,
+                        Step::Multiply => a * b,
+                        Step::Divide => a / b,
+                        _ => a.power(b),
+                    };
+                }
+            }
+        }
+        stack[0]
+    }
+}
+
+fn push<S: Scalar>(stack: &mut [S; DEEPEST], top: &mut usize, value: S) {
+    stack[*top] = value;
+    *top += 1;
+}
+
+fn whole<S: Scalar>(x: S, exponent: i32) -> S {
+    let power = (0..exponent.unsigned_abs()).fold(S::one(), |product, _| product * x);
+    if exponent < 0 { power.recip() } else { power }
+}
+
+fn call<S: Scalar>(function: Function, x: S) -> S {
+    match function {
+        Function::Abs => x.magnitude(),
+        Function::Sqrt => x.root(),
+        Function::Exp => x.exponential(),
+        Function::Ln => x.logarithm(),
+        Function::Tanh => x.hyperbolic_tangent(),
+        Function::Atan => x.arctangent(),
+        Function::Logistic => x.logistic(),
+    }
+}
+
+/// Recursive descent; what it has read is on the stack of the program it writes, `depth` numbers of it.
+struct Reader<'a> {
+    text: &'a str,
+    at: usize,
+    shape: &'a [&'a str],
+    steps: Vec<Step>,
+    depth: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn rest(&self) -> &'a str {
+        &self.text[self.at..]
+    }
+
+    fn space(&mut self) {
+        self.at += self.rest().len() - self.rest().trim_start().len();
+    }
+
+    fn fault(&self, expected: &str) -> FormulaFault {
+        let found = self.rest().trim_start().chars().take(12).collect::<String>();
+        FormulaFault {
+            formula: self.text.chars().take(80).collect(),
+            place: self.text[..self.at].chars().count() + 1,
+            expected: expected.to_owned(),
+            found: if found.is_empty() { "the end".to_owned() } else { format!("`{found}`") },
+        }
+    }
+
+    fn take(&mut self, token: &str) -> bool {
+        self.space();
+        let there = self.rest().starts_with(token);
+        if there {
+            self.at += token.len();
+        }
+        there
+    }
+
+    fn value(&mut self, step: Step) -> Result<(), FormulaFault> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(self.fault("a formula that is less deep"));
+        }
+        self.steps.push(step);
+        Ok(())
+    }
+
+    fn pair(&mut self, step: Step) {
+        self.depth -= 1;
+        self.steps.push(step);
+    }
+
+    fn sum(&mut self, nested: usize) -> Result<(), FormulaFault> {
+        // Parentheses and signs nest without a number that waits.
+        if nested > 4 * DEEPEST {
+            return Err(self.fault("a formula that is less deep"));
+        }
+        self.product(nested)?;
+        loop {
+            let step = match () {
+                () if self.take("+") => Step::Add,
+                () if self.take("-") => Step::Subtract,
+                () => return Ok(()),
+            };
+            self.product(nested)?;
+            self.pair(step);
+        }
+    }
+
+    fn product(&mut self, nested: usize) -> Result<(), FormulaFault> {
+        self.signed(nested)?;
+        loop {
+            self.space();
+            let step = match () {
+                () if self.rest().starts_with("**") => return Ok(()),
+                () if self.take("*") => Step::Multiply,
+                () if self.take("/") => Step::Divide,
+                () => return Ok(()),
+            };
+            self.signed(nested)?;
+            self.pair(step);
+        }
+    }
+
+    /// `-x^2` is `-(x^2)`, as everywhere.
+    fn signed(&mut self, nested: usize) -> Result<(), FormulaFault> {
+        if nested > 4 * DEEPEST {
+            return Err(self.fault("a formula that is less deep"));
+        }
+        if self.take("-") {
+            self.signed(nested + 1)?;
+            self.steps.push(Step::Negate);
+            return Ok(());
+        }
+        if self.take("+") {
+            return self.signed(nested + 1);
+        }
+        self.power(nested)
+    }
+
+    fn power(&mut self, nested: usize) -> Result<(), FormulaFault> {
+        self.atom(nested)?;
+        if !(self.take("^") || self.take("**")) {
+            return Ok(());
+        }
+        let before = self.steps.len();
+        self.signed(nested + 1)?;
+        let exponent = match self.steps[before..] {
+            [Step::Number(x)] => Some(x),
+            [Step::Number(x), Step::Negate] => Some(-x),
+            _ => None,
+        };
+        match exponent.filter(|x| x.fract() == 0.0 && x.abs() <= PRODUCT) {
+            Some(x) => {
+                self.steps.truncate(before);
+                self.pair(Step::Whole(x as i32));
+            }
+            None => self.pair(Step::Power),
+        }
+        Ok(())
+    }
+
+    fn atom(&mut self, nested: usize) -> Result<(), FormulaFault> {
+        self.space();
+        if self.take("(") {
+            self.sum(nested + 1)?;
+            return self.close();
+        }
+        let rest = self.rest();
+        let word: usize =
+            rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').map(char::len_utf8).sum();
+        if rest.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+            return self.number();
+        }
+        match &rest[..word] {
+            "v" => self.named(word, Step::Velocity),
+            "T" => self.named(word, Step::Temperature),
+            "pi" => self.named(word, Step::Number(std::f64::consts::PI)),
+            "sign" => {
+                self.at += word;
+                if !(self.take("(") && self.take("v")) {
+                    return Err(self.fault("`(v)`: no other sign is smooth where designs ask for it"));
+                }
+                self.value(Step::Sign)?;
+                self.close()
+            }
+            name => {
+                if let Some(k) = self.shape.iter().position(|symbol| symbol == &name) {
+                    return self.named(word, Step::Shape(k));
+                }
+                let function = match name {
+                    "abs" => Function::Abs,
+                    "sqrt" => Function::Sqrt,
+                    "exp" => Function::Exp,
+                    "ln" => Function::Ln,
+                    "tanh" => Function::Tanh,
+                    "atan" => Function::Atan,
+                    "logistic" => Function::Logistic,
+                    _ => return Err(self.unknown()),
+                };
+                self.at += word;
+                if !self.take("(") {
+                    return Err(self.fault("`(`"));
+                }
+                self.sum(nested + 1)?;
+                self.close()?;
+                self.steps.push(Step::Call(function));
+                Ok(())
+            }
+        }
+    }
+
+    fn unknown(&self) -> FormulaFault {
+        let functions = RESERVED[3..].join(", ");
+        let parameters = match self.shape {
+            [] => "no shape parameter (there is none under `shape`)".to_owned(),
+            names => format!("a shape parameter ({})", names.join(", ")),
+        };
+        self.fault(&format!("a number, v, T, pi, {parameters} or a function ({functions})"))
+    }
+
+    fn close(&mut self) -> Result<(), FormulaFault> {
+        if self.take(")") { Ok(()) } else { Err(self.fault("`)`")) }
+    }
+
+    fn named(&mut self, length: usize, step: Step) -> Result<(), FormulaFault> {
+        self.value(step)?;
+        self.at += length;
+        Ok(())
+    }
+
+    fn number(&mut self) -> Result<(), FormulaFault> {
+        let rest = self.rest().as_bytes();
+        let digits = |from: usize| rest[from..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let mut end = digits(0);
+        if rest.get(end) == Some(&b'.') {
+            end += 1 + digits(end + 1);
+        }
+        if matches!(rest.get(end), Some(b'e' | b'E')) {
+            let sign = usize::from(matches!(rest.get(end + 1), Some(b'+' | b'-')));
+            let exponent = digits(end + 1 + sign);
+            end += if exponent > 0 { 1 + sign + exponent } else { 0 };
+        }
+        match self.rest()[..end].parse::<f64>().ok().filter(|x| x.is_finite()) {
+            Some(x) => self.named(end, Step::Number(x)),
+            None => Err(self.fault("a finite number")),
+        }
+    }
+}
