@@ -269,6 +269,37 @@ def test_settings_that_arrays_have_no_use_for(indy7: dynid.Robot, made: dynid.Si
             dynid.identify(indy7, made.log, **settings)
 
 
+def test_a_law_of_friction_of_ones_own() -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    law = {"columns": {"hc": "sign(v) * (1 - 1/(1 + (v/hv)**2))", "hs": "sign(v) / (1 + (v/hv)**2)"}, "shape": {"hv": [0.02, 1.5]}}
+    rng = np.random.default_rng(3)
+    t = np.arange(8000) / 250
+    w = np.array([[1.1, 1.7], [2.9, 2.3]])
+    q = sum(0.5 / (k + 1) * np.sin(w[k] * t[:, None] + k) for k in range(2))
+    v = sum(0.5 / (k + 1) * w[k] * np.cos(w[k] * t[:, None] + k) for k in range(2))
+    a = sum(-0.5 / (k + 1) * w[k] ** 2 * np.sin(w[k] * t[:, None] + k) for k in range(2))
+    friction = np.sign(v) * (2 + 1.5 / (1 + (v / 0.2) ** 2)) + 0.7 * v
+    # The bodies are those of the file; its own friction has no part in it.
+    bodies = [0.0 if name.startswith(tuple(f"{joint}." for joint in arm.joints)) else x for name, x in zip(arm.parameter_names, arm.parameters, strict=True)]
+    tau = arm.inverse_dynamics(q, v, a, parameters=bodies) + friction
+    log = dynid.Log(t, q, tau + 0.02 * rng.normal(size=tau.shape))
+    own = {joint: ["hess_soom", "viscous"] for joint in arm.joints}
+    settings: dict[str, Any] = {"law": {"hess_soom": law}, "elements": {"joint": own, "friction": "given"}}
+    found = dynid.identify(arm, log, **settings)
+    value = {p["name"]: (p["value"], p["std"]) for p in found.record["parameters"] + found.record["shape_parameters"]}
+    for joint in arm.joints:
+        for symbol, true in {"hc": 2.0, "hs": 3.5, "fv": 0.7, "hv": 0.2}.items():
+            x, std = value[f"{joint}.{symbol}"]
+            assert abs(x - true) < 5 * std + 0.01, (joint, symbol, x, std)
+    again = pickle.loads(pickle.dumps(found))
+    assert (again.predict(q[:50], v[:50], a[:50]) == found.predict(q[:50], v[:50], a[:50])).all()
+    assert np.abs(found.predict(q, v, a) - tau).max() < 0.3
+    with pytest.raises(dynid.SettingError, match=r"law `hess_soom`: column `hc`: `sgn\(v\)`, character 1"):
+        dynid.identify(arm, log, **{**settings, "law": {"hess_soom": {"columns": {"hc": "sgn(v)"}}}})
+    with pytest.raises(dynid.SettingError, match="which none does"):
+        dynid.identify(arm, log, law={"hess_soom": law})
+
+
 def test_files_tell_what_they_lose(tmp_path: Path) -> None:
     arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
     made = dynid.simulate(arm, duration_s=20, rate_hz=200, seed=1)

@@ -25,9 +25,6 @@ pub struct LawSpec {
     /// The effort is friction: it counts in reports on passivity, and a law for all joints takes its place. Default true.
     #[serde(default = "yes")]
     pub friction: bool,
-    /// Author and year of the source.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reference: Option<String>,
 }
 
 fn yes() -> bool {
@@ -146,7 +143,6 @@ impl LawSpec {
             columns: terms.columns.iter().map(column).collect(),
             shape: terms.shape.iter().map(shape).collect(),
             friction: terms.is_friction,
-            reference: kind.reference.map(str::to_owned),
         })
     }
 
@@ -180,11 +176,7 @@ impl LawSpec {
             shape: self.shape.iter().map(shape).collect::<Result<_, _>>()?,
             is_friction: self.friction,
         })?;
-        let kind = ElementKind::formula(name, law);
-        Ok(match &self.reference {
-            Some(reference) => kind.reference(kept(reference)),
-            None => kind,
-        })
+        Ok(ElementKind::formula(name, law))
     }
 }
 

@@ -527,7 +527,7 @@ impl Error {
                 let meant = meant.map_or_else(String::new, |meant| format!("did you mean `{meant}`? "));
                 Some(format!(
                     "{meant}elements are given by --elements, under [elements] in a configuration, under [defaults] and \
-                     [element.<joint>] in a robot file; one of a program's own is known to that program alone"
+                     [element.<joint>] in a robot file; a law of your own stands there under `[law.NAME]`, one of a program's own is known to that program alone"
                 ))
             }
             Error::EstimateFile { .. } => {

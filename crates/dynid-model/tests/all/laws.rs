@@ -24,7 +24,7 @@ impl VelocityLaw<1, 2> for HessSoom {
     }
 }
 
-fn pendulum(elements: Vec<Box<dyn JointElement>>) -> RobotModel {
+pub(super) fn pendulum(elements: Vec<Box<dyn JointElement>>) -> RobotModel {
     let mut d = Description::new("pendulum");
     d.links.extend(["l0", "l1"].map(|l| LinkDescription { name: l.into(), inertia: None }));
     d.joints.push(JointDescription {

@@ -4,6 +4,7 @@ mod adjoint;
 mod clearance;
 mod closed;
 mod elastic;
+mod formula;
 mod forward_dynamics;
 mod friction;
 mod golden;

@@ -60,6 +60,12 @@ impl ElementPlan {
             ));
         }
         plan.per_rate = plan.per_rate.iter().map(|list| law.of_joint(plan.registry(), list)).collect();
+        if let Some(idle) =
+            settings.law.keys().find(|name| !plan.per_rate.iter().flatten().any(|e| e == *name))
+        {
+            let expected = "a law that the elements of a joint name";
+            return Err(Error::setting("law", expected, format!("`{idle}`, which none does")));
+        }
         if let Some(known) = &settings.elements.known {
             plan.known = known.of_joints(&names)?;
             plan.known_source = Some(known.source.clone());

@@ -117,6 +117,95 @@ fn an_own_law_goes_the_whole_way() {
     }
 }
 
+const LAW: &str = "[law.hess_soom]\nshape = { hv = [0.003, 0.9] }\n[law.hess_soom.columns]\n\
+    hc = { formula = \"sign(v) * (1 - 1 / (1 + (v / hv)^2))\", least = 0 }\n\
+    hs = { formula = \"sign(v) / (1 + (v / hv)^2)\", least = 0 }\n";
+
+#[test]
+fn a_law_of_formulas_goes_the_whole_way_without_a_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let write = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
+    let searched = format!("{ARM}hess_soom = {{ hv = {{ start = 0.25, lower = 0.05, upper = 1.0 }} }}\n");
+    write("truth.toml", &format!("{ARM}{VALUES}{LAW}"));
+    write("own.toml", &format!("{searched}{LAW}"));
+    write(
+        "arm.toml",
+        &searched.replace("[\"hess_soom\", \"viscous\", \"offset\"]", "[\"viscous\", \"offset\"]"),
+    );
+    let robot = Robot::load(&path("truth.toml"), &RobotOptions::default()).unwrap();
+    let settings = SimulateSettings::parse("rate_hz = 250\nseed = 3", "simulation").unwrap();
+    let log = simulate(&robot, &settings).unwrap();
+    let columns: [&[f64]; 3] = [&log.time, &log.position[0], &log.effort[0]];
+    csv::write(path("log.csv"), &["t", "q1", "tau1"], &columns).unwrap();
+
+    // The robot file states the law, or the configuration does, or a program has it in code.
+    let given = "[[log]]\npath = \"log.csv\"\n[elements]\nfriction = \"given\"\n";
+    write("a.toml", &format!("robot = \"own.toml\"\n{given}"));
+    write(
+        "b.toml",
+        &format!(
+            "robot = \"arm.toml\"\n{given}joint = {{ j1 = [\"hess_soom\", \"viscous\", \"offset\"] }}\n{LAW}"
+        ),
+    );
+    let [a, b] =
+        ["a.toml", "b.toml"].map(|name| identify(&Config::read(&path(name)).unwrap(), &mut |_| {}).unwrap());
+    write("plain.toml", &searched);
+    write("c.toml", &format!("robot = \"plain.toml\"\n{given}"));
+    let config = Config { registry: registry(), ..Config::read(&path("c.toml")).unwrap() };
+    let code = identify(&config, &mut |_| {}).unwrap();
+    let [a, b, code] = [a, b, code].map(|found| found.estimate());
+    for p in ["j1.hc", "j1.hs", "j1.fv", "j1.fo"] {
+        let of = |e: &Estimate| e.parameters.iter().find(|q| q.name == p).map(|q| (q.value, q.std)).unwrap();
+        assert_eq!(of(&a), of(&b), "{p}");
+        let ((x, std), (y, _)) = (of(&a), of(&code));
+        assert!((x - y).abs() < 1e-3 * std.unwrap(), "{p}: {x} {y}");
+    }
+    assert!((a.shape_parameters[0].value - code.shape_parameters[0].value).abs() < 1e-6);
+    assert_eq!(a.friction_passivity[0].passivity.word(), "passive");
+
+    // The result file is read by anybody.
+    let file = path("estimate.json");
+    std::fs::write(&file, a.to_json()).unwrap();
+    let read = Estimate::read(&file).unwrap();
+    assert_eq!(read.to_json(), a.to_json());
+    let states = dynid::io::States {
+        rows: log.time.len(),
+        position: log.clean[0].clone(),
+        velocity: log.clean[1].clone(),
+        acceleration: log.clean[2].clone(),
+        gravity: None,
+        channels: Vec::new(),
+    };
+    let model = read.effort_model(&file, Split::Consistent).unwrap();
+    let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();
+    let worst = predicted[0].iter().zip(&log.clean[3][0]).map(|(p, c)| (p - c).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.2, "{worst} N m off the true effort");
+    let damaged = a.to_json().replace("(v / hv)^2", "(v / hv)^");
+    std::fs::write(&file, damaged).unwrap();
+    let read = Estimate::read(&file).map(|read| read.effort_model(&file, Split::Consistent).map(drop));
+    let said = read.map_or_else(|e| e.to_string(), |model| model.unwrap_err().to_string());
+    assert!(said.contains("law `hess_soom`: column `hc`"), "{said}");
+
+    // What is no law is told with its place.
+    write("bad.toml", &format!("{ARM}{}", LAW.replace("sign(v) /", "sgn(v) /")));
+    let said = Robot::load(&path("bad.toml"), &RobotOptions::default()).unwrap_err();
+    let line = 1 + ARM.lines().count();
+    assert!(said.to_string().contains(&format!("bad.toml:{line}")), "{said}");
+    assert!(
+        said.to_string()
+            .contains("law `hess_soom`: column `hs`: `sgn(v) / (1 + (v / hv)^2)`, character 1: expected"),
+        "{said}"
+    );
+    assert!(said.hint().unwrap().contains("[law.mine]"));
+    write("d.toml", &format!("robot = \"arm.toml\"\n{given}{}", LAW.replace("hs =", "fs =")));
+    let said = identify(&Config::read(&path("d.toml")).unwrap(), &mut |_| {}).unwrap_err().to_string();
+    assert!(
+        said.contains("law `hess_soom`") && said.contains("`fs`") && said.contains("`stribeck`"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_registry_refuses_names_and_symbols_that_are_taken() {
     let found = registry().with(ElementKind::law("hess_soom", laws::Coulomb)).unwrap_err();

@@ -94,6 +94,15 @@ impl Formula {
 
     /// Its value.
     pub(super) fn at<S: Scalar>(&self, v: Velocity<S>, shape: &[S]) -> S {
+        self.run(v, shape, S::power)
+    }
+
+    /// Its value, not a number where a number below 0 is raised to a power that is not whole: [`Scalar::power`] takes none.
+    pub(super) fn tried(&self, v: Velocity<f64>, shape: &[f64]) -> f64 {
+        self.run(v, shape, |x, p| if x < 0.0 { f64::NAN } else { x.power(p) })
+    }
+
+    fn run<S: Scalar>(&self, v: Velocity<S>, shape: &[S], power: impl Fn(S, S) -> S) -> S {
         let mut stack = [S::zero(); DEEPEST];
         let mut top = 0;
         for step in &self.steps {
@@ -114,7 +123,7 @@ impl Formula {
                         Step::Subtract => a - b,
                         Step::Multiply => a * b,
                         Step::Divide => a / b,
-                        _ => a.power(b),
+                        _ => power(a, b),
                     };
                 }
             }

@@ -169,7 +169,7 @@ impl FormulaLaw {
                 for temperature in WARM {
                     let at = Velocity { value: v, sign_width: 0.0, temperature };
                     for (formula, (term, _)) in self.formulas.iter().zip(&self.terms.columns) {
-                        let found = formula.at(at, &shape);
+                        let found = formula.tried(at, &shape);
                         if !found.is_finite() {
                             let at = self.terms.shape.iter().map(|t| t.symbol).zip(shape).collect();
                             return Err(FormulaLawFault::NotFinite { symbol: term.symbol, found, v, at });

@@ -13,7 +13,7 @@ use std::sync::{Arc, LazyLock};
 /// The kinds of elements that a robot may have, in the order in which they are listed.
 ///
 /// A value that travels with what a robot file says of elements; the default holds what comes with the crate. Cheap to clone.
-/// Two are equal if they hold kinds of the same names.
+/// Two are equal if they hold kinds of the same names, with the same formulas where they are laws of formulas.
 #[derive(Clone)]
 pub struct ElementRegistry {
     kinds: Arc<Vec<ElementKind>>,
@@ -58,7 +58,10 @@ impl Default for ElementRegistry {
 
 impl PartialEq for ElementRegistry {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.kinds, &other.kinds) || self.names().eq(other.names())
+        let alike = |registry: &Self| {
+            registry.kinds().map(|kind| (kind.name, kind.formula.clone())).collect::<Vec<_>>()
+        };
+        Arc::ptr_eq(&self.kinds, &other.kinds) || alike(self) == alike(other)
     }
 }
 

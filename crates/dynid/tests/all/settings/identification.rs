@@ -754,6 +754,19 @@ fn cases() -> Vec<Case> {
             "[instruments]\nreference = \"qref_{joint}\"\ndivergence = 0.001",
             Changes,
         ),
+        table("law.columns", RISING, Changes),
+        table(
+            "law.columns",
+            "[law.mine]\ncolumns = { mk = \"sgn(v)\" }",
+            Refused("law `mine`: column `mk`: `sgn(v)`, character 1: expected"),
+        ),
+        table(
+            "law.columns",
+            "[law.mine]\ncolumns = { mk = \"v\" }",
+            Refused("found `mine`, which none does"),
+        ),
+        beside("law.shape", RISING, HELD, Changes),
+        beside("law.friction", ALONE, NO_FRICTION, Changes),
         table("tie.equal", "[[tie]]\nequal = [\"j1.fc\", \"j2.fc\"]", Changes),
         table("tie.equal", "[[tie]]\nequal = [\"j1.fc\", \"j9.fc\"]", Refused("j9.fc")),
         beside(
@@ -885,6 +898,16 @@ const TEXTBOOK: &str = "[conditioning]\nroute = \"textbook\"\n";
 const POLYNOMIALS: &str = "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 11";
 const FREQUENCY: &str = "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"";
 const AVERAGED: &str = "[conditioning]\nroute = \"textbook\"\naverage_periods = true";
+
+const RISING: &str = "[law.mine]\ncolumns = { mk = \"sign(v) * (1 - exp(-abs(v) / mv))\" }\nshape = { mv = [0.01, 2] }\n\
+    [elements]\ndefault = [\"mine\", \"viscous\"]\nfriction = \"given\"";
+const HELD: &str = "[law.mine]\ncolumns = { mk = \"sign(v) * (1 - exp(-abs(v) / mv))\" }\n\
+    shape = { mv = { lower = 0.01, upper = 2, start = 1, held = true } }\n\
+    [elements]\ndefault = [\"mine\", \"viscous\"]\nfriction = \"given\"";
+const ALONE: &str = "[law.mine]\ncolumns = { mk = \"sign(v) * (1 - exp(-abs(v) / mv))\" }\nshape = { mv = [0.01, 2] }\n\
+    [elements]\ndefault = [\"mine\"]\nfriction = \"given\"";
+const NO_FRICTION: &str = "[law.mine]\ncolumns = { mk = \"sign(v) * (1 - exp(-abs(v) / mv))\" }\nshape = { mv = [0.01, 2] }\n\
+    friction = false\n[elements]\ndefault = [\"mine\"]\nfriction = \"given\"";
 
 #[test]
 fn every_key_of_an_identification_takes_effect_or_is_refused() {
