@@ -1,8 +1,9 @@
 //! A law of formulas at a joint: the element.
 
-use dynid_algebra::scalar::{Cross, Dual, Jet, Scalar};
+use dynid_algebra::scalar::{Cross, Dual, FusedTask, Jet, Scalar, run_fused};
 
 use super::FormulaAtJoint;
+use super::expression::{Formula, Inputs};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::{
     ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, Velocity, temperature_channel,
@@ -36,21 +37,73 @@ impl FormulaAtJoint {
         })
     }
 
-    /// Calls `f` with every sample, its velocity and its temperature.
-    fn samples(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, mut f: impl FnMut(usize, f64, f64)) {
+    /// Calls `to` with every sample and the value of a formula there, on numbers that `number` makes of the velocity.
+    fn samples<S: Scalar>(
+        &self,
+        formula: usize,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[S],
+        number: impl Fn(f64) -> S,
+        to: impl FnMut(usize, S),
+    ) {
         let joint = &joints[self.rate].name;
         let logged = self.law.is_thermal().then(|| match temperature_of(motion.channels, joint) {
             Some(logged) => logged,
             None => panic!("motion block without channel `{}`", temperature_channel(joint)),
         });
-        for (sample, v) in motion.rate(self.rate).iter().enumerate() {
-            f(sample, *v, logged.map_or(0.0, |t| t[sample]));
+        let formula = &self.law.formulas[formula];
+        let speeds = motion.rate(self.rate);
+        run_fused(Samples { formula, speeds, logged, sign_width: motion.sign_width, shape, number, to });
+    }
+}
+
+/// Samples that are worked on at once.
+const BLOCK: usize = 32;
+
+struct Samples<'a, S, F, T> {
+    formula: &'a Formula,
+    speeds: &'a [f64],
+    logged: Option<&'a [f64]>,
+    sign_width: f64,
+    shape: &'a [S],
+    number: F,
+    to: T,
+}
+
+impl<S: Scalar, F: Fn(f64) -> S, T: FnMut(usize, S)> Samples<'_, S, F, T> {
+    #[inline(always)]
+    fn run(mut self) {
+        let mut stack = Formula::stack::<S, BLOCK>();
+        let zero = [S::zero(); BLOCK];
+        let mut inputs = Inputs { v: zero, sign: zero, temperature: zero };
+        for first in (0..self.speeds.len()).step_by(BLOCK) {
+            let count = BLOCK.min(self.speeds.len() - first);
+            for k in 0..count {
+                let value = (self.number)(self.speeds[first + k]);
+                let v = Velocity { value, sign_width: self.sign_width, temperature: S::zero() };
+                (inputs.v[k], inputs.sign[k]) = (value, v.sign());
+                if let Some(logged) = self.logged {
+                    inputs.temperature[k] = S::from_f64(logged[first + k]);
+                }
+            }
+            self.formula.run(&inputs, self.shape, &mut stack, S::power);
+            for (k, value) in stack[0].iter().enumerate().take(count) {
+                (self.to)(first + k, *value);
+            }
         }
     }
 }
 
-fn velocity<S: Scalar>(value: S, temperature: f64, motion: &MotionBlock<'_>) -> Velocity<S> {
-    Velocity { value, sign_width: motion.sign_width, temperature: S::from_f64(temperature) }
+impl<S: Scalar, F: Fn(f64) -> S, T: FnMut(usize, S)> FusedTask for Samples<'_, S, F, T> {
+    #[inline(always)]
+    fn fused(self) {
+        self.run();
+    }
+    #[inline(always)]
+    fn plain(self) {
+        self.run();
+    }
 }
 
 fn dual(value: f64, derivative: f64) -> Dual<1> {
@@ -88,9 +141,9 @@ impl JointElement for FormulaAtJoint {
         out: &mut ElementColumns<'_>,
     ) {
         let shape = self.values(shape);
-        for (entry, formula) in self.law.formulas.iter().enumerate() {
+        for entry in 0..self.law.formulas.len() {
             let to = out.column(entry);
-            self.samples(joints, motion, |k, v, warm| to[k] = formula.at(velocity(v, warm, motion), &shape));
+            self.samples(entry, joints, motion, &shape, |v| v, |s, value| to[s] = value);
         }
     }
     fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
@@ -120,10 +173,8 @@ impl JointElement for FormulaAtJoint {
         for (pair, (entry, k, _)) in self.pairs().enumerate() {
             let by: Vec<Dual<1>> =
                 values.iter().enumerate().map(|(p, x)| dual(*x, f64::from(u8::from(p == k)))).collect();
-            let (formula, to) = (&self.law.formulas[entry], out.column(pair));
-            self.samples(joints, motion, |s, v, warm| {
-                to[s] = formula.at(velocity(dual(v, 0.0), warm, motion), &by).derivative[0];
-            });
+            let to = out.column(pair);
+            self.samples(entry, joints, motion, &by, |v| dual(v, 0.0), |s, x| to[s] = x.derivative[0]);
         }
     }
     fn shape_adjoint(
@@ -140,11 +191,9 @@ impl JointElement for FormulaAtJoint {
             let of =
                 |(p, x): (usize, &f64)| Cross { value: *x, a: 0.0, b: f64::from(u8::from(p == k)), ab: 0.0 };
             let by: Vec<Cross> = values.iter().enumerate().map(of).collect();
-            let (formula, weights) = (&self.law.formulas[entry], weights.column(pair));
-            self.samples(joints, motion, |s, v, warm| {
-                let v = Cross { value: v, a: 1.0, b: 0.0, ab: 0.0 };
-                to[s] += weights[s] * formula.at(velocity(v, warm, motion), &by).ab;
-            });
+            let weights = weights.column(pair);
+            let number = |v| Cross { value: v, a: 1.0, b: 0.0, ab: 0.0 };
+            self.samples(entry, joints, motion, &by, number, |s, x| to[s] += weights[s] * x.ab);
         }
     }
     fn adjoint(
@@ -157,11 +206,10 @@ impl JointElement for FormulaAtJoint {
     ) {
         let shape: Vec<Dual<1>> = self.values(shape).into_iter().map(|x| dual(x, 0.0)).collect();
         let to = &mut out.dq[self.rate * motion.samples..][..motion.samples];
-        for (entry, formula) in self.law.formulas.iter().enumerate() {
+        for entry in 0..self.law.formulas.len() {
             let weights = weights.column(entry);
-            self.samples(joints, motion, |s, v, warm| {
-                to[s] += weights[s] * formula.at(velocity(dual(v, 1.0), warm, motion), &shape).derivative[0];
-            });
+            let add = |s: usize, x: Dual<1>| to[s] += weights[s] * x.derivative[0];
+            self.samples(entry, joints, motion, &shape, |v| dual(v, 1.0), add);
         }
     }
 }

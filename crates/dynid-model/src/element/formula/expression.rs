@@ -94,64 +94,95 @@ impl Formula {
 
     /// Its value.
     pub(super) fn at<S: Scalar>(&self, v: Velocity<S>, shape: &[S]) -> S {
-        self.run(v, shape, S::power)
+        self.alone(v, shape, S::power)
     }
 
     /// Its value, not a number where a number below 0 is raised to a power that is not whole: [`Scalar::power`] takes none.
     pub(super) fn tried(&self, v: Velocity<f64>, shape: &[f64]) -> f64 {
-        self.run(v, shape, |x, p| if x < 0.0 { f64::NAN } else { x.power(p) })
+        self.alone(v, shape, |x, p| if x < 0.0 { f64::NAN } else { x.power(p) })
     }
 
-    fn run<S: Scalar>(&self, v: Velocity<S>, shape: &[S], power: impl Fn(S, S) -> S) -> S {
-        let mut stack = [S::zero(); DEEPEST];
+    fn alone<S: Scalar>(&self, v: Velocity<S>, shape: &[S], power: impl Fn(S, S) -> S) -> S {
+        let inputs = Inputs { v: [v.value()], sign: [v.sign()], temperature: [v.temperature()] };
+        let mut stack = [[S::zero()]; DEEPEST];
+        self.run(&inputs, shape, &mut stack, power);
+        stack[0][0]
+    }
+
+    /// Room for the numbers that wait, for [`Formula::run`].
+    pub(super) fn stack<S: Scalar, const N: usize>() -> Vec<[S; N]> {
+        vec![[S::zero(); N]; DEEPEST]
+    }
+
+    /// Its values at `N` samples at once, left in the first place of the stack: a step of the program is chosen once for all of them.
+    #[inline(always)]
+    pub(super) fn run<S: Scalar, const N: usize>(
+        &self,
+        at: &Inputs<S, N>,
+        shape: &[S],
+        stack: &mut [[S; N]],
+        power: impl Fn(S, S) -> S,
+    ) {
         let mut top = 0;
         for step in &self.steps {
             match *step {
-                Step::Number(x) => push(&mut stack, &mut top, S::from_f64(x)),
-                Step::Velocity => push(&mut stack, &mut top, v.value()),
-                Step::Sign => push(&mut stack, &mut top, v.sign()),
-                Step::Temperature => push(&mut stack, &mut top, v.temperature()),
-                Step::Shape(k) => push(&mut stack, &mut top, shape[k]),
-                Step::Negate => stack[top - 1] = -stack[top - 1],
-                Step::Whole(exponent) => stack[top - 1] = whole(stack[top - 1], exponent),
-                Step::Call(function) => stack[top - 1] = call(function, stack[top - 1]),
-                Step::Add | Step::Subtract | Step::Multiply | Step::Divide | Step::Power => {
-                    let (a, b) = (stack[top - 2], stack[top - 1]);
-                    top -= 1;
-                    stack[top - 1] = match step {
-                        Step::Add => a + b,
-                        Step::Subtract => a - b,
-                        Step::Multiply => a * b,
-                        Step::Divide => a / b,
-                        _ => power(a, b),
-                    };
-                }
+                Step::Number(x) => push(stack, &mut top, &[S::from_f64(x); N]),
+                Step::Velocity => push(stack, &mut top, &at.v),
+                Step::Sign => push(stack, &mut top, &at.sign),
+                Step::Temperature => push(stack, &mut top, &at.temperature),
+                Step::Shape(k) => push(stack, &mut top, &[shape[k]; N]),
+                Step::Negate => each(&mut stack[top - 1], |x| -x),
+                Step::Whole(exponent) => each(&mut stack[top - 1], |x| whole(x, exponent)),
+                Step::Call(Function::Abs) => each(&mut stack[top - 1], S::magnitude),
+                Step::Call(Function::Sqrt) => each(&mut stack[top - 1], S::root),
+                Step::Call(Function::Exp) => each(&mut stack[top - 1], S::exponential),
+                Step::Call(Function::Ln) => each(&mut stack[top - 1], S::logarithm),
+                Step::Call(Function::Tanh) => each(&mut stack[top - 1], S::hyperbolic_tangent),
+                Step::Call(Function::Atan) => each(&mut stack[top - 1], S::arctangent),
+                Step::Call(Function::Logistic) => each(&mut stack[top - 1], S::logistic),
+                Step::Add => pair(stack, &mut top, |a, b| a + b),
+                Step::Subtract => pair(stack, &mut top, |a, b| a - b),
+                Step::Multiply => pair(stack, &mut top, |a, b| a * b),
+                Step::Divide => pair(stack, &mut top, |a, b| a / b),
+                Step::Power => pair(stack, &mut top, &power),
             }
         }
-        stack[0]
     }
 }
 
-fn push<S: Scalar>(stack: &mut [S; DEEPEST], top: &mut usize, value: S) {
-    stack[*top] = value;
+/// What a formula reads at `N` samples.
+pub(super) struct Inputs<S, const N: usize> {
+    pub(super) v: [S; N],
+    pub(super) sign: [S; N],
+    pub(super) temperature: [S; N],
+}
+
+#[inline(always)]
+fn push<S: Scalar, const N: usize>(stack: &mut [[S; N]], top: &mut usize, values: &[S; N]) {
+    stack[*top] = *values;
     *top += 1;
 }
 
+#[inline(always)]
+fn each<S: Scalar, const N: usize>(values: &mut [S; N], f: impl Fn(S) -> S) {
+    for x in values {
+        *x = f(*x);
+    }
+}
+
+#[inline(always)]
+fn pair<S: Scalar, const N: usize>(stack: &mut [[S; N]], top: &mut usize, f: impl Fn(S, S) -> S) {
+    *top -= 1;
+    let (below, above) = stack.split_at_mut(*top);
+    for (a, b) in below[*top - 1].iter_mut().zip(&above[0]) {
+        *a = f(*a, *b);
+    }
+}
+
+#[inline(always)]
 fn whole<S: Scalar>(x: S, exponent: i32) -> S {
     let power = (0..exponent.unsigned_abs()).fold(S::one(), |product, _| product * x);
     if exponent < 0 { power.recip() } else { power }
-}
-
-fn call<S: Scalar>(function: Function, x: S) -> S {
-    match function {
-        Function::Abs => x.magnitude(),
-        Function::Sqrt => x.root(),
-        Function::Exp => x.exponential(),
-        Function::Ln => x.logarithm(),
-        Function::Tanh => x.hyperbolic_tangent(),
-        Function::Atan => x.arctangent(),
-        Function::Logistic => x.logistic(),
-    }
 }
 
 /// Recursive descent; what it has read is on the stack of the program it writes, `depth` numbers of it.
