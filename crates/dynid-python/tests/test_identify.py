@@ -269,6 +269,55 @@ def test_settings_that_arrays_have_no_use_for(indy7: dynid.Robot, made: dynid.Si
             dynid.identify(indy7, made.log, **settings)
 
 
+class Stream:
+    """A table of which nothing is known but Arrow's C interface."""
+
+    def __init__(self, table: Any) -> None:
+        self.table = table
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        return self.table.__arrow_c_stream__(requested_schema)
+
+
+def test_tables_by_the_c_interface_of_arrow() -> None:
+    pa = pytest.importorskip("pyarrow")
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=20, rate_hz=100, seed=5)
+    table = {"t": made.t, **{f"{s}_{j}": x[:, k] for s, x in (("q", made.q), ("tau", made.tau)) for k, j in enumerate(arm.joints)}}
+    whole = pa.table(table)
+    # Parts of different lengths, one of them the middle of another table, whose buffers begin before it.
+    parts = pa.concat_tables([whole.slice(0, 700), whole.slice(700, 1), whole.slice(701)])
+    expected = dynid.identify(arm, dynid.Log.from_table(table)).to_json()
+    for given in (Stream(whole), Stream(parts), whole):
+        assert dynid.identify(arm, dynid.Log.from_table(given)).to_json() == expected
+
+    from dynid._arrow import columns
+
+    odd = pa.table({"i": pa.array([1, None, 3], pa.int16()), "b": pa.array([True, False, None]), "f": pa.array([0.5, None, 2.5], pa.float32())})
+    found = columns(Stream(pa.concat_tables([odd, odd.slice(1, 2), odd.slice(3)])))
+    nan = np.nan
+    np.testing.assert_array_equal(found["i"], [1, nan, 3, nan, 3])
+    np.testing.assert_array_equal(found["b"], [1, 0, nan, 0, nan])
+    np.testing.assert_array_equal(found["f"], [0.5, nan, 2.5, nan, 2.5])
+    assert columns(Stream(odd.slice(0, 0)))["i"].shape == (0,)
+    with pytest.raises(TypeError, match="column `name`: expected numbers"):
+        columns(Stream(pa.table({"name": ["a"]})))
+    with pytest.raises(TypeError, match="columns with names"):
+        columns(Stream(pa.chunked_array([[1.0, 2.0]])))
+
+    def batches() -> Any:
+        yield whole.to_batches()[0]
+        raise RuntimeError("the disk is gone")
+
+    with pytest.raises(ValueError, match="the disk is gone"):
+        columns(Stream(pa.RecordBatchReader.from_batches(whole.schema, batches())))
+
+    # Results go out the same way.
+    out = columns(Stream(dynid.Table({"x": [1.0, 2.5], "n": [3, None]})))
+    np.testing.assert_array_equal(out["x"], [1.0, 2.5])
+    np.testing.assert_array_equal(out["n"], [3, nan])
+
+
 def test_a_law_of_friction_of_ones_own() -> None:
     arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
     law = {"columns": {"hc": "sign(v) * (1 - 1/(1 + (v/hv)**2))", "hs": "sign(v) / (1 + (v/hv)**2)"}, "shape": {"hv": [0.02, 1.5]}}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._arrow import columns
 from ._settings import as_json
 
 
@@ -71,10 +72,14 @@ class Log:
 
     @classmethod
     def from_table(cls, table: Any, **settings: Any) -> Log:
-        """A log of named columns: a dictionary of arrays, a pandas, polars or pyarrow table.
+        """A log of named columns: a dictionary of arrays, a pandas, polars or pyarrow table, or whatever offers `__arrow_c_stream__`
+        (DuckDB, arro3, nanoarrow and others), which needs no library beside.
 
         Columns are `t`, `q_<joint>`, `tau_<joint>`, and `dq_<joint>` where velocities were measured; others, `temperature_<joint>` for
         example, become channels."""
+        by_name = isinstance(table, Mapping) or hasattr(table, "column_names") or hasattr(table, "columns")
+        if hasattr(table, "__arrow_c_stream__") and not (by_name and hasattr(table, "__getitem__")):
+            table = columns(table)
         names = [str(name) for name in getattr(table, "column_names", None) or (table if isinstance(table, Mapping) else table.columns)]
 
         def column(name: str) -> NDArray[np.float64]:

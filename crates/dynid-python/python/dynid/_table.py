@@ -11,7 +11,8 @@ from typing import Any
 class Table(Mapping[str, list[Any]]):
     """Named columns of equal length: a mapping from name to list.
 
-    `to_pandas()`, `to_polars()` and `to_arrow()` need those libraries; `rows()` needs none.
+    `to_pandas()`, `to_polars()` and `to_arrow()` need those libraries; `rows()` needs none. Libraries that read `__arrow_c_stream__` (DuckDB, polars and
+    others) take it as it is where there is pyarrow.
     """
 
     def __init__(self, columns: Mapping[str, Sequence[Any]]) -> None:
@@ -53,6 +54,10 @@ class Table(Mapping[str, list[Any]]):
     def to_arrow(self) -> Any:
         """A `pyarrow.Table`."""
         return import_module("pyarrow").table(self._columns)
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """A stream of Arrow's C interface."""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
 
     def __repr__(self) -> str:
         lines = [[_short(_text(x)) for x in row] for row in zip(*self._columns.values(), strict=True)]

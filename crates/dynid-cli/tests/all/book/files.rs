@@ -61,18 +61,18 @@ fn completed_run(text: &str) -> Result<String, String> {
     Ok(table.to_string())
 }
 
-/// An excerpt of a robot file, its `[element]` tables put into that of the Indy7.
+/// An excerpt of a robot file, its `[element]` and `[law]` tables put into that of the Indy7.
 fn completed_robot(text: &str) -> Result<String, String> {
     let part: Table = toml::from_str(text).map_err(|e| e.to_string())?;
     let whole = std::fs::read_to_string(root().join("robots/indy7.toml")).unwrap();
     let mut whole: Table = toml::from_str(&whole).map_err(|e| e.to_string())?;
     for (key, value) in part {
-        if key != "element" {
-            return Err(format!("an excerpt of a robot file holds elements, not `{key}`"));
+        if key != "element" && key != "law" {
+            return Err(format!("an excerpt of a robot file holds elements and laws, not `{key}`"));
         }
-        let elements = whole.entry("element").or_insert_with(|| Value::Table(Table::new()));
-        let elements = elements.as_table_mut().ok_or("`element` is no table")?;
-        elements.extend(value.as_table().ok_or("`element` is no table")?.clone());
+        let tables = whole.entry(key).or_insert_with(|| Value::Table(Table::new()));
+        let tables = tables.as_table_mut().ok_or("no table")?;
+        tables.extend(value.as_table().ok_or("no table")?.clone());
     }
     Ok(whole.to_string())
 }
