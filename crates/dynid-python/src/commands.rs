@@ -4,13 +4,15 @@ use std::sync::{Mutex, PoisonError};
 
 use dynid::compare::compare_logs;
 use dynid::config::Config;
-use dynid::design::{DesignConfig, DesignStep, design as run_design};
+use dynid::design::next::{NextSettings, Wanted, next};
+use dynid::design::{DesignConfig, DesignRun, DesignStep, design as run_design};
 use dynid::friction::{FrictionConfig, FrictionStep, friction_of_logs};
 use dynid::gains::gains_of_logs;
 use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
 use dynid::pipeline::held_where_not_logged;
 use dynid::preflight;
+use dynid::reduce::Reduction;
 use dynid::servo::{ServoConfig, ServoStep, identify_servo};
 use dynid::settings::Method;
 use numpy::PyArrayMethods;
@@ -19,6 +21,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{Batch, demand_finite, vector};
 use crate::error::{raise, setting};
+use crate::factor::Factor;
 use crate::log::Log;
 use crate::robot::Robot;
 use crate::settings::{as_json, parsed, settings};
@@ -175,6 +178,49 @@ pub(crate) fn design<'py>(
     let out = PyDict::new(py);
     out.set_item("record", as_json(&record)?)?;
     out.set_item("report", page)?;
+    with_motion(&out, &run)?;
+    Ok(out)
+}
+
+/// The shortest motion that narrows intervals to what is wanted (`NAME=WIDTH`), given factors of all logs so far: as [`design`].
+#[pyfunction]
+#[pyo3(signature = (config, factors, wanted, longest_s, *, progress=None, threads=0))]
+pub(crate) fn next_motion<'py>(
+    py: Python<'py>,
+    config: &str,
+    factors: Vec<PyRef<'py, Factor>>,
+    wanted: Vec<String>,
+    longest_s: Option<f64>,
+    progress: Option<Bound<'py, PyAny>>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let config: DesignConfig = parsed(py, config, "settings of a design")?;
+    let refused = |text: String| {
+        setting(py, format!("setting `want`: {text}"), "`want={\"j1.fc\": \"5%\"}`, or a half width")
+    };
+    let wanted = wanted.iter().map(|w| w.parse().map_err(refused)).collect::<PyResult<Vec<Wanted>>>()?;
+    let parts: Vec<Reduction> = factors.iter().map(|f| f.reduction.clone()).collect();
+    let earlier = Reduction::merge(parts).map_err(|e| raise(py, &e.into()))?;
+    let defaults = NextSettings::default();
+    let asked = NextSettings { wanted, longest_s: longest_s.unwrap_or(defaults.longest_s) };
+    let (run, record, page) = work::run(py, progress, threads, move |tell| {
+        let run = next(&config, &asked, &earlier, &mut |step| tell(words(step)))?;
+        let record = run.record()?;
+        let page = run.report(&record)?;
+        Ok((run, record, page))
+    })?;
+    let out = PyDict::new(py);
+    out.set_item("record", as_json(&record)?)?;
+    out.set_item("report", page)?;
+    if let Some(design) = &run.design {
+        with_motion(&out, design)?;
+    }
+    Ok(out)
+}
+
+/// Puts the motion of a design, if there is one, beside its record.
+fn with_motion(out: &Bound<'_, PyDict>, run: &DesignRun) -> PyResult<()> {
+    let py = out.py();
     if let Ok(designed) = &run.outcome {
         let sampled = designed.motion.sampled().map_err(|e| raise(py, &e))?;
         let rows = sampled.time.len();
@@ -192,7 +238,7 @@ pub(crate) fn design<'py>(
             out.set_item("commands", vector(py, &flat).reshape([rows, told.len()])?)?;
         }
     }
-    Ok(out)
+    Ok(())
 }
 
 fn words(step: DesignStep) -> String {

@@ -21,7 +21,7 @@ mod _native {
     #[pymodule_export]
     use super::command_line;
     #[pymodule_export]
-    use super::commands::{Online, check, compare, design, friction, gains, servo};
+    use super::commands::{Online, check, compare, design, friction, gains, next_motion, servo};
     #[pymodule_export]
     use super::error::{
         DynidError, DynidWarning, EstimateError, LogError, RobotError, SettingError, UnsupportedError,

@@ -129,6 +129,31 @@ def test_a_design_is_followed_and_tells_what_it_said() -> None:
     assert not none.feasible and none.headline
 
 
+def test_what_to_record_next() -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=10, rate_hz=200, seed=1)
+    found = dynid.identify(arm, made.log)
+    so_far = found.reduce(made.log)
+    before = {p["name"]: p["half_width"] for p in found.record["base_parameters"]}
+    steps: list[str] = []
+    want: dict[str, float | str] = {"shoulder.fv": "0.5%", "elbow.fc": 1e3}
+    asked: dict[str, Any] = {"limits": {"acceleration": 10}, "search": {"starts": 1}, "trajectory": {"harmonics": 3}}
+    following = dynid.next_motion(arm, so_far, want, longest_s=200, progress=steps.append, **asked)
+    rows = {row["name"]: row for row in following.wanted.rows()}
+    assert set(rows) == {"shoulder.fv", "elbow.fc"} and rows["elbow.fc"]["state"] == "holds already", rows
+    first = rows["shoulder.fv"]
+    assert first["half_width"] == pytest.approx(before["shoulder.fv"], rel=0.5) and first["wanted_half_width"] < first["half_width"]
+    assert following.feasible and following.joints == arm.joints and following.q.shape == (len(following.t), 2) and steps
+    assert first["half_width_after"] <= first["wanted_half_width"] * 1.001 and first["state"] == "reached", first
+    assert "<html" in following.report().lower() and following.status in repr(following)
+    none = dynid.next_motion(arm, [so_far], {"elbow.fc": 1e3}, **asked)
+    assert not none.feasible and "nothing has to be recorded" in none.headline
+    with pytest.raises(dynid.SettingError, match="elbow.fcc"):
+        dynid.next_motion(arm, so_far, {"elbow.fcc": 1}, **asked)
+    with pytest.raises(dynid.SettingError, match="setting `want`: expected NAME=WIDTH"):
+        dynid.next_motion(arm, so_far, {"elbow.fc": "much"}, **asked)
+
+
 def test_a_robot_that_runs() -> None:
     arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
     made = dynid.simulate(arm, duration_s=60, rate_hz=200, seed=1)

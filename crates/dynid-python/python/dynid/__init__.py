@@ -14,7 +14,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 """
 
 from . import examples
-from ._commands import Comparison, Design, Gains, Online, check, compare, design, gains
+from ._commands import Comparison, Design, Gains, NextMotion, Online, check, compare, design, gains, next_motion
 from ._estimate import Estimate, Factor, identify, identify_file
 from ._friction import Friction, FrictionLog, PreslidingLog, friction
 from ._fleet import FactorStore, Fleet, ManifestRow, fleet, read_manifest, reduce_log
@@ -51,6 +51,7 @@ __all__ = [
     "Log",
     "LogError",
     "ManifestRow",
+    "NextMotion",
     "Online",
     "PreslidingLog",
     "Robot",
@@ -71,6 +72,7 @@ __all__ = [
     "gains",
     "identify",
     "identify_file",
+    "next_motion",
     "read_columns",
     "read_manifest",
     "reduce_log",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._estimate import Progress, native_logs, teller, written
+from ._estimate import Factor, Progress, native_logs, teller, written
 from ._log import Log
 from ._servo import Servo
 from ._robot_file import robot_keys
@@ -172,6 +172,54 @@ def design(robot: _native.Robot, *, progress: Progress = None, threads: int = 0,
             settings = {**settings, "drives": str(path)}
         with robot_keys(robot, settings) as config:
             return Design(_native.design(config, progress=teller(progress), threads=threads))
+
+
+class NextMotion(Design):
+    """The shortest motion that narrows intervals to what is wanted, with what is expected of it.
+
+    As `Design`; without a motion (`feasible` is False) nothing has to be recorded, or no motion would help. `record`: the keys of `next.json`.
+    """
+
+    @property
+    def status(self) -> str:
+        """`pass`, `warn` or `fail`."""
+        return str(self.record["verdict"]["status"])
+
+    @property
+    def wanted(self) -> Table:
+        """A row per parameter of which an interval is wanted.
+
+        Columns: `name`, `unit`, `value`, `half_width` (95 %, today; None if it is not seen), `wanted_half_width`, `half_width_after` (expected), `state` (what comes of it),
+        `combination` (what data see of a parameter that acts only together with others)."""
+        names = ("name", "unit", "value", "half_width", "wanted_half_width", "half_width_after", "state", "combination")
+        return Table.of_rows(self.record["wanted"], names)
+
+    def __repr__(self) -> str:
+        return f"<dynid.NextMotion: {self.status}>\n{self.headline}"
+
+
+def next_motion(
+    robot: _native.Robot,
+    after: Factor | Iterable[Factor],
+    want: Mapping[str, float | str],
+    *,
+    longest_s: float | None = None,
+    progress: Progress = None,
+    threads: int = 0,
+    **settings: Any,
+) -> NextMotion:
+    """Designs what to record next, as `dynid next` does: the shortest motion within the limits that brings the intervals that are wanted.
+
+    `after`: factors of all logs so far (`Estimate.reduce`, merged or not). `want`: half widths of 95 % intervals by name, in the parameter's unit or as a share (`{"j1.fc": 0.05,
+    "link2.*": "10%"}`; `*` stands for any text). `longest_s`: longest record, 120 s unless stated. `settings`: the tables of a design file that hold here: `limits`, `trajectory`, `search`, `keep`, ...
+
+    That no motion brings what is wanted is an outcome (`wanted`), not an error. Raises `SettingError` for names that are no parameters.
+    """
+    factors = [after] if isinstance(after, Factor) else list(after)
+    wanted = [f"{name}={width}" for name, width in want.items()]
+    with robot_keys(robot, settings) as config:
+        natives = [factor._native for factor in factors]
+        return NextMotion(_native.next_motion(config, natives, wanted, longest_s, progress=teller(progress), threads=threads))
 
 
 class Online:

@@ -216,6 +216,16 @@ def servo(
 ) -> tuple[str, str, list[tuple[str, str]]]: ...
 def design(config: str, *, progress: Callable[[str], object] | None = None, threads: int = 0) -> dict[str, Any]: ...
 
+def next_motion(
+    config: str,
+    factors: list[Factor],
+    wanted: list[str],
+    longest_s: float | None,
+    *,
+    progress: Callable[[str], object] | None = None,
+    threads: int = 0,
+) -> dict[str, Any]: ...
+
 class Online:
     def __init__(self, config: str, header: list[str]) -> None: ...
     @property
