@@ -119,7 +119,7 @@ fn numbers_operators_and_functions_are_those_of_everywhere() {
         ("(-v)**3 * (1 + v^2)**-2", -v.powi(3) / (1.0 + v * v).powi(2)),
         ("2e-3*v + .5 + 1.", 2e-3 * v + 1.5),
         ("--v - +v", 0.0),
-        ("ln(exp(v)) + sqrt(v^4)", v + v * v),
+        ("ln(exp(v)) + sqrt(1 + v^2)", v + (1.0 + v * v).sqrt()),
         ("atan(v) * 2 / pi", v.atan() * 2.0 / std::f64::consts::PI),
         ("logistic(v) - 0.5", sigmoid - 0.5),
         ("sign( v ) * abs(-3)", 3.0),
@@ -177,6 +177,12 @@ fn what_is_no_law_is_refused_with_the_place() {
     assert!(fault(&[("mk", &"-".repeat(900))], &[]).contains("less deep"));
     assert!(fault(&[("mk", &format!("{}1{}", "(1+".repeat(40), ")".repeat(40)))], &[]).contains("less deep"));
     assert!(fault(&[("mk", &"v*".repeat(900))], &[]).contains("at most 1000"));
+    assert!(fault(&[("mk", "sqrt(abs(v))")], &[]).contains("expected a finite slope at every speed, found"));
+    assert!(fault(&[("mk", "1 / (1 + exp(-v / vs))")], &[speed("vs")]).contains("a finite slope"));
+    assert!(
+        FormulaLaw::new(terms(&[("mk", "logistic(v / vs) - 0.5"), ("mj", "abs(v)^0.5")], &[speed("vs")]))
+            .is_ok()
+    );
     assert!(fault(&[("mk", "1 / v")], &[]).contains("finite number at every speed, found"));
     assert!(
         fault(&[("mk", "v * vs / vs"), ("mj", "v")], &[speed("vs"), speed("vt")])

@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 pub use expression::{FormulaFault, RESERVED};
 
+use dynid_algebra::scalar::{Cross, Scalar};
+
 use super::{LinearTerm, ShapeTerm, Velocity};
 use expression::Formula;
 
@@ -74,11 +76,13 @@ pub enum FormulaLawFault {
         /// The parameter.
         symbol: &'static str,
     },
-    /// A column that is no number somewhere.
-    #[error("column `{symbol}`: expected a finite number at every speed, found {found} at v = {v}{}", at.iter().map(|(s, x)| format!(", {s} = {x}")).collect::<String>())]
+    /// A column that is no number somewhere, or has no slope.
+    #[error("column `{symbol}`: expected a finite {what} at every speed, found {found} at v = {v}{}", at.iter().map(|(s, x)| format!(", {s} = {x}")).collect::<String>())]
     NotFinite {
         /// The coefficient.
         symbol: &'static str,
+        /// `number` or `slope`.
+        what: &'static str,
         /// What it is there.
         found: f64,
         /// The velocity.
@@ -166,13 +170,30 @@ impl FormulaLaw {
         for end in ends {
             let shape: Vec<f64> = settings.iter().map(end).collect();
             for v in TRIED.into_iter().flat_map(|v| [v, -v]).chain([0.0]) {
-                for temperature in WARM {
-                    let at = Velocity { value: v, sign_width: 0.0, temperature };
-                    for (formula, (term, _)) in self.formulas.iter().zip(&self.terms.columns) {
-                        let found = formula.tried(at, &shape);
-                        if !found.is_finite() {
-                            let at = self.terms.shape.iter().map(|t| t.symbol).zip(shape).collect();
-                            return Err(FormulaLawFault::NotFinite { symbol: term.symbol, found, v, at });
+                for (temperature, (formula, (term, _))) in WARM.into_iter().flat_map(|warm| {
+                    self.formulas.iter().zip(&self.terms.columns).map(move |column| (warm, column))
+                }) {
+                    let fault = |what, found| {
+                        let at =
+                            self.terms.shape.iter().map(|t| t.symbol).zip(shape.iter().copied()).collect();
+                        FormulaLawFault::NotFinite { symbol: term.symbol, what, found, v, at }
+                    };
+                    let found = formula.tried(Velocity { value: v, sign_width: 0.0, temperature }, &shape);
+                    if !found.is_finite() {
+                        return Err(fault("number", found));
+                    }
+                    // Slopes may have none where the number is finite: `1 / (1 + exp(-v / w))` once the exponential is beyond all numbers.
+                    for by in 0..shape.len().max(1) {
+                        let of = |(k, x): (usize, &f64)| cross(*x, 0.0, f64::from(u8::from(k == by)));
+                        let shape: Vec<Cross> = shape.iter().enumerate().map(of).collect();
+                        let at = Velocity {
+                            value: cross(v, 1.0, 0.0),
+                            sign_width: 0.0,
+                            temperature: Cross::from_f64(temperature),
+                        };
+                        let Cross { a, b, ab, .. } = formula.at(at, &shape);
+                        if let Some(slope) = [a, b, ab].into_iter().find(|slope| !slope.is_finite()) {
+                            return Err(fault("slope", slope));
                         }
                     }
                 }
@@ -180,6 +201,10 @@ impl FormulaLaw {
         }
         Ok(())
     }
+}
+
+fn cross(value: f64, a: f64, b: f64) -> Cross {
+    Cross { value, a, b, ab: 0.0 }
 }
 
 /// The text as one that lives as long as the program, as names of kinds do: each is kept once.
