@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import dask
+import dask.config
 import dynid
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 
