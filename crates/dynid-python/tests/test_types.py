@@ -15,7 +15,7 @@ from conftest import ROOT
 def test_types_hold() -> None:
     api = pytest.importorskip("mypy.api")
     text, _, status = api.run(
-        [str(ROOT / "crates/dynid-python" / part) for part in ("python/dynid", "tests")]
+        [str(ROOT / part) for part in ("crates/dynid-python/python/dynid", "crates/dynid-python/tests", "examples/fleet")]
         + ["--config-file", str(ROOT / "pyproject.toml"), "--no-incremental"]
     )
     assert status == 0, text
