@@ -182,7 +182,7 @@ impl FormulaLaw {
                     if !found.is_finite() {
                         return Err(fault("number", found));
                     }
-                    // Slopes may have none where the number is finite: `1 / (1 + exp(-v / w))` once the exponential is beyond all numbers.
+                    // There may be no slope where the number is finite: `1 / (1 + exp(-v / w))` once the exponential is beyond all numbers.
                     for by in 0..shape.len().max(1) {
                         let of = |(k, x): (usize, &f64)| cross(*x, 0.0, f64::from(u8::from(k == by)));
                         let shape: Vec<Cross> = shape.iter().enumerate().map(of).collect();
