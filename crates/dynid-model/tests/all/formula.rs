@@ -203,3 +203,77 @@ fn what_is_no_law_is_refused_with_the_place() {
     });
     assert_ne!(one, two);
 }
+
+#[test]
+fn only_what_takes_energy_out_is_a_coefficient_of_friction() {
+    let columns = ["sign(v)", "-v^3", "v", "abs(v)"].into_iter().zip(["ma", "mb", "mc", "md"]);
+    let columns = columns.map(|(text, symbol)| (LinearTerm::effort(symbol).coefficient(), text.to_owned()));
+    let terms = FormulaTerms { columns: columns.collect(), shape: Vec::new(), is_friction: true };
+    let kind = ElementKind::formula("mine", FormulaLaw::new(terms).unwrap());
+    let registry = ElementRegistry::default().with(kind).unwrap();
+    assert_eq!(
+        ["ma", "mb", "mc", "md"].map(|symbol| registry.is_coefficient(symbol)),
+        [true, false, true, false]
+    );
+}
+
+/// Whatever is put together of the parts of formulas is a law or is refused; a law has as many numbers as samples.
+#[test]
+fn random_formulas_are_laws_or_refused() {
+    let parts = [
+        "v",
+        "T",
+        "mw",
+        "pi",
+        "2",
+        "0.5",
+        "1e-3",
+        "(",
+        ")",
+        "(",
+        ")",
+        "+",
+        "-",
+        "*",
+        "/",
+        "^",
+        "**",
+        "sign(v)",
+        "abs(",
+        "sqrt(",
+        "exp(",
+        "ln(",
+        "tanh(",
+        "atan(",
+        "logistic(",
+        " ",
+        "é",
+        "v",
+        "1",
+    ];
+    let mut state = 7_u64;
+    let mut draw = |most: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % most
+    };
+    let shape = [ShapeTerm::positive("mw", element::units::SPEED, 0.1, 10.0)];
+    let mut laws = 0;
+    for _ in 0..100_000 {
+        let text: String = (0..1 + draw(9)).map(|_| parts[draw(parts.len())]).collect();
+        // The second column reads the parameter in any case.
+        let Ok(law) = FormulaLaw::new(terms(&[("mk", &text), ("mj", "v / mw")], &shape)) else { continue };
+        laws += 1;
+        let kind = ElementKind::formula("mine", law);
+        let setting = [ShapeSetting { start: 1.0, lower: 0.1, upper: 10.0, held: false }];
+        let placed = kind.place(&Place { rate: 0, shape: &setting, options: &[] }).and_then(Result::ok);
+        let model = pendulum(vec![placed.unwrap()]);
+        let (channel, warm, zeros) = (temperature_channel("j1"), [25.0; 3], [0.0; 3]);
+        let channels: [(&str, &[f64]); 1] = [(&channel, &warm)];
+        let motion =
+            MotionBlock { channels: &channels, ..MotionBlock::plain(3, &zeros, &[-1.0, 0.0, 3.0], &zeros) };
+        let mut block = RegressorBlock::new(model.layout().clone(), 3);
+        model.regressor(&motion, &[1.0], &mut block);
+        assert!(block.column(0, 10).iter().all(|x| x.is_finite()), "{text}");
+    }
+    assert!(laws > 1_000, "{laws}");
+}

@@ -109,12 +109,12 @@ impl FormulaLaw {
     /// # Errors
     /// [`FormulaLawFault`].
     pub fn new(terms: FormulaTerms) -> Result<Self, FormulaLawFault> {
-        for (expected, found) in
-            [("1 to 8 columns", terms.columns.len()), ("0 to 8 shape parameters", 1.max(terms.shape.len()))]
-        {
-            if !(1..=MOST).contains(&found) {
-                return Err(FormulaLawFault::Count { expected, found });
-            }
+        let (columns, shapes) = (terms.columns.len(), terms.shape.len());
+        if columns == 0 || columns > MOST {
+            return Err(FormulaLawFault::Count { expected: "1 to 8 columns", found: columns });
+        }
+        if shapes > MOST {
+            return Err(FormulaLawFault::Count { expected: "at most 8 shape parameters", found: shapes });
         }
         let symbols = terms.columns.iter().map(|c| c.0.symbol).chain(terms.shape.iter().map(|s| s.symbol));
         let mut seen = HashSet::new();
@@ -139,13 +139,18 @@ impl FormulaLaw {
                 .map_err(|fault| FormulaLawFault::Formula { symbol: term.symbol, fault })
         };
         let formulas = terms.columns.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        let law = FormulaLaw { terms, formulas };
+        let mut law = FormulaLaw { terms, formulas };
         if let Some((_, term)) =
             law.terms.shape.iter().enumerate().find(|(k, _)| !law.formulas.iter().any(|f| f.reads(*k)))
         {
             return Err(FormulaLawFault::Unused { symbol: term.symbol });
         }
         law.tried()?;
+        // A coefficient of friction takes energy out of the motion where it is positive: `-v^3` has none.
+        for ((term, _), formula) in law.terms.columns.iter_mut().zip(&law.formulas) {
+            term.coefficient &=
+                points(&law.terms.shape).all(|(v, at, shape)| v * formula.tried(at, &shape) >= 0.0);
+        }
         Ok(law)
     }
 
@@ -165,42 +170,47 @@ impl FormulaLaw {
     }
 
     fn tried(&self) -> Result<(), FormulaLawFault> {
-        let settings: Vec<_> = self.terms.shape.iter().map(|term| term.setting(1.0)).collect();
-        let ends: [fn(&super::ShapeSetting) -> f64; 3] = [|s| s.start, |s| s.lower, |s| s.upper];
-        for end in ends {
-            let shape: Vec<f64> = settings.iter().map(end).collect();
-            for v in TRIED.into_iter().flat_map(|v| [v, -v]).chain([0.0]) {
-                for (temperature, (formula, (term, _))) in WARM.into_iter().flat_map(|warm| {
-                    self.formulas.iter().zip(&self.terms.columns).map(move |column| (warm, column))
-                }) {
-                    let fault = |what, found| {
-                        let at =
-                            self.terms.shape.iter().map(|t| t.symbol).zip(shape.iter().copied()).collect();
-                        FormulaLawFault::NotFinite { symbol: term.symbol, what, found, v, at }
+        for (v, at, shape) in points(&self.terms.shape) {
+            for (formula, (term, _)) in self.formulas.iter().zip(&self.terms.columns) {
+                let fault = |what, found| {
+                    let at = self.terms.shape.iter().map(|t| t.symbol).zip(shape.iter().copied()).collect();
+                    FormulaLawFault::NotFinite { symbol: term.symbol, what, found, v, at }
+                };
+                let found = formula.tried(at, &shape);
+                if !found.is_finite() {
+                    return Err(fault("number", found));
+                }
+                // There may be no slope where the number is finite: `1 / (1 + exp(-v / w))` once the exponential is beyond all numbers.
+                for by in 0..shape.len().max(1) {
+                    let of = |(k, x): (usize, &f64)| cross(*x, 0.0, f64::from(u8::from(k == by)));
+                    let shape: Vec<Cross> = shape.iter().enumerate().map(of).collect();
+                    let at = Velocity {
+                        value: cross(v, 1.0, 0.0),
+                        sign_width: 0.0,
+                        temperature: Cross::from_f64(at.temperature),
                     };
-                    let found = formula.tried(Velocity { value: v, sign_width: 0.0, temperature }, &shape);
-                    if !found.is_finite() {
-                        return Err(fault("number", found));
-                    }
-                    // There may be no slope where the number is finite: `1 / (1 + exp(-v / w))` once the exponential is beyond all numbers.
-                    for by in 0..shape.len().max(1) {
-                        let of = |(k, x): (usize, &f64)| cross(*x, 0.0, f64::from(u8::from(k == by)));
-                        let shape: Vec<Cross> = shape.iter().enumerate().map(of).collect();
-                        let at = Velocity {
-                            value: cross(v, 1.0, 0.0),
-                            sign_width: 0.0,
-                            temperature: Cross::from_f64(temperature),
-                        };
-                        let Cross { a, b, ab, .. } = formula.at(at, &shape);
-                        if let Some(slope) = [a, b, ab].into_iter().find(|slope| !slope.is_finite()) {
-                            return Err(fault("slope", slope));
-                        }
+                    let Cross { a, b, ab, .. } = formula.at(at, &shape);
+                    if let Some(slope) = [a, b, ab].into_iter().find(|slope| !slope.is_finite()) {
+                        return Err(fault("slope", slope));
                     }
                 }
             }
         }
         Ok(())
     }
+}
+
+/// Where columns are tried: velocities of both signs and none, at temperatures, with all shape parameters at their start, lower and upper bounds.
+fn points(shape: &[ShapeTerm]) -> impl Iterator<Item = (f64, Velocity<f64>, Vec<f64>)> {
+    let settings: Vec<_> = shape.iter().map(|term| term.setting(1.0)).collect();
+    let ends: [fn(&super::ShapeSetting) -> f64; 3] = [|s| s.start, |s| s.lower, |s| s.upper];
+    let velocities = || TRIED.into_iter().flat_map(|v| [v, -v]).chain([0.0]);
+    ends.into_iter().flat_map(move |end| {
+        let shape: Vec<f64> = settings.iter().map(end).collect();
+        velocities().flat_map(|v| WARM.map(|temperature| (v, temperature))).map(move |(v, temperature)| {
+            (v, Velocity { value: v, sign_width: 0.0, temperature }, shape.clone())
+        })
+    })
 }
 
 fn cross(value: f64, a: f64, b: f64) -> Cross {
