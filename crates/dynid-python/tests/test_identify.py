@@ -302,6 +302,9 @@ def test_tables_by_the_c_interface_of_arrow() -> None:
     assert columns(Stream(odd.slice(0, 0)))["i"].shape == (0,)
     with pytest.raises(TypeError, match="column `name`: expected numbers"):
         columns(Stream(pa.table({"name": ["a"]})))
+    whole_rows = pa.StructArray.from_arrays([pa.array([1.0, 2.0])], ["x"], mask=pa.array([True, False]))
+    with pytest.raises(TypeError, match="null as a whole"):
+        columns(Stream(pa.chunked_array([whole_rows])))
     with pytest.raises(TypeError, match="columns with names"):
         columns(Stream(pa.chunked_array([[1.0, 2.0]])))
 

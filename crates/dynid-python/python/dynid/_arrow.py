@@ -89,6 +89,8 @@ def columns(table: Any) -> dict[str, NDArray[np.float64]]:
             if not batch.release:
                 break
             try:
+                if batch.null_count and batch.buffers[0]:
+                    raise TypeError("table: expected rows that are there, found some that are null as a whole")
                 parts.append([read(batch.children[k].contents, batch.offset, batch.length) for k, read in enumerate(readers)])
             finally:
                 released(batch)
