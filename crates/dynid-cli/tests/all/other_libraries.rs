@@ -1,12 +1,16 @@
 //! Exported robots in other programs: Pinocchio and MuJoCo load them and give the effort of the estimate.
 //!
-//! Needs Python with the modules `pinocchio` and `mujoco`: that of the system, or an environment under `target/` that is
-//! made here once from PyPI. Where neither is to be had, the test passes with a notice.
+//! Needs Python with the modules `pinocchio` and `mujoco`: that of the system, or the environment under `target/` that
+//! the tests of the Python package use, made here from PyPI if it is not there. Where neither is to be had, the tests pass
+//! with a notice.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
+use std::fs::File;
+use std::io::{Read as _, Seek as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use crate::support::{TWO_LINKS, dynid, indy7, run};
@@ -37,39 +41,60 @@ const WELDED: &str = r#"<robot name="welded">
 </robot>
 "#;
 
-/// Runs a command for at most some seconds; `None` if it fails, cannot be started or takes longer.
-fn output(command: &mut Command, seconds: u64) -> Option<String> {
-    let mut child =
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().ok()?;
+/// What a command prints within some seconds, or why it does not end well.
+fn output(command: &mut Command, seconds: u64) -> Result<String, String> {
+    let (told, errors) = (tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap());
+    let text = |mut file: File| {
+        let mut text = String::new();
+        file.rewind().and_then(|()| file.read_to_string(&mut text)).unwrap();
+        text
+    };
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(told.try_clone().unwrap())
+        .stderr(errors.try_clone().unwrap())
+        .spawn()
+        .map_err(|e| e.to_string())?;
     let end = Instant::now() + Duration::from_secs(seconds);
-    while child.try_wait().ok()?.is_none() {
-        if Instant::now() > end {
-            let _ = child.kill();
-            let _ = child.wait();
-            return None;
+    loop {
+        match child.try_wait().unwrap() {
+            Some(status) if status.success() => return Ok(text(told)),
+            Some(status) => return Err(format!("{status}: {}", text(errors))),
+            None if Instant::now() > end => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(format!("not done after {seconds} s: {}", text(errors)));
+            }
+            None => std::thread::sleep(Duration::from_millis(20)),
         }
-        std::thread::sleep(Duration::from_millis(20));
     }
-    let output = child.wait_with_output().ok()?;
-    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// A Python with both modules.
-fn python() -> Option<PathBuf> {
+/// A Python with both modules: found, or made, by the first test that asks; two tests that install into one environment
+/// at the same time would take files from under each other.
+fn python() -> Option<&'static Path> {
+    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PYTHON.get_or_init(find_python).as_deref()
+}
+
+fn find_python() -> Option<PathBuf> {
     let has_modules =
-        |python: &Path| output(Command::new(python).args(["-c", "import pinocchio, mujoco"]), 60).is_some();
+        |python: &Path| output(Command::new(python).args(["-c", "import pinocchio, mujoco"]), 60).is_ok();
     let system = PathBuf::from("python3");
     if has_modules(&system) {
         return Some(system);
     }
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pinocchio-mujoco");
+    // The environment of the tests of the Python package, which need both modules too.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("python");
     let own = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     if has_modules(&own) {
         return Some(own);
     }
-    output(Command::new(system).args(["-m", "venv"]).arg(&folder), 60)?;
+    if !own.is_file() {
+        output(Command::new(system).args(["-m", "venv"]).arg(&folder), 60).ok()?;
+    }
     let install = ["-m", "pip", "install", "--quiet", "--retries", "0", "--timeout", "10", "pin", "mujoco"];
-    output(Command::new(&own).args(install), 300)?;
+    output(Command::new(&own).args(install), 300).ok()?;
     has_modules(&own).then_some(own)
 }
 
@@ -101,7 +126,8 @@ fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64, f64
     run(at, &["export", "estimate.json", "--urdf", "robot.urdf", "--mjcf", "robot.xml"], 0);
 
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all/other_libraries/check.py");
-    let said = output(Command::new(python).arg(script).arg(at), 60).unwrap();
+    let said =
+        output(Command::new(python).arg(script).arg(at), 120).unwrap_or_else(|e| panic!("{name}: {e}"));
     println!("{name}: {}", said.trim());
     let result: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
     for file in ["pinocchio urdf", "mujoco urdf", "mujoco mjcf"] {
@@ -130,20 +156,20 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
         std::fs::write(&path, text).unwrap();
         path
     };
-    check(&python, "two links", &robot("arm.urdf", TWO_LINKS), lively);
-    check(&python, "indy7", &robot("indy7.toml", &indy7()), |_, _, truth| truth);
-    check(&python, "indy7 as identified", &robot("indy7.toml", &indy7()), |_, identified, _| identified);
+    check(python, "two links", &robot("arm.urdf", TWO_LINKS), lively);
+    check(python, "indy7", &robot("indy7.toml", &indy7()), |_, _, truth| truth);
+    check(python, "indy7 as identified", &robot("indy7.toml", &indy7()), |_, identified, _| identified);
     let welded = robot("welded.urdf", WELDED);
-    check(&python, "welded links that keep the file", &welded, lively);
+    check(python, "welded links that keep the file", &welded, lively);
     // A ram lighter than the file's tool: the tool has no share left.
-    check(&python, "welded links without mass", &welded, |name, identified, truth| {
+    check(python, "welded links without mass", &welded, |name, identified, truth| {
         if name.starts_with("ram.") { 0.3 * truth } else { lively(name, identified, truth) }
     });
     let Some(oracles) = shared_if_there("data/oracles") else { return };
     for robot in ["ur5", "iiwa14", "panda"] {
         let file = oracles.join(format!("{robot}.urdf"));
-        check(&python, robot, &file, lively);
-        check(&python, &format!("{robot} as identified"), &file, |_, identified, _| identified);
+        check(python, robot, &file, lively);
+        check(python, &format!("{robot} as identified"), &file, |_, identified, _| identified);
     }
 }
 
@@ -170,9 +196,9 @@ fn loops_are_closed_in_mujoco_and_its_drives_need_the_same_efforts() {
         run(at, &["export", estimate, "--mjcf", "robot.xml", "--allow-unphysical"], 0);
         run(at, &["predict", estimate, "--states", "clean.csv", "--out", "effort.csv"], 0);
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all/other_libraries/loops.py");
-        let mut command = Command::new(&python);
+        let mut command = Command::new(python);
         command.arg(script).args([path("robot.xml"), path("clean.csv"), path("effort.csv")]);
-        let said = output(&mut command, 120).unwrap_or_else(|| panic!("{robot}: MuJoCo refuses the file"));
+        let said = output(&mut command, 120).unwrap_or_else(|e| panic!("{robot}: {e}"));
         let said: Value = serde_json::from_str(said.trim()).unwrap();
         println!("{robot}: {said}");
         assert!(
