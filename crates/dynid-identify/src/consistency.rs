@@ -6,7 +6,7 @@ use dynid_estimate::consistent::{
 use dynid_estimate::folds::FoldSettings;
 use dynid_estimate::held_out::{Comparison, Estimator, compare};
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
-use dynid_estimate::linear::ols;
+use dynid_estimate::linear::ols_values;
 use dynid_factor::Factor;
 use dynid_linalg::Mat;
 use dynid_model::inertia::PARAMETERS_PER_BODY;
@@ -86,7 +86,7 @@ pub(crate) fn consistent(
     let prior_base = base.values(&prior.values);
     let linear = |training: &Factor| -> Vec<f64> {
         // Base parameters that a fold does not excite keep the prior's value.
-        let change = ols(&training.centred(&prior_base)).x;
+        let (change, _) = ols_values(&training.centred(&prior_base));
         change.iter().zip(&prior_base).map(|(d, b)| d + b).collect()
     };
     let mut unconstrained = unconstrained(regrouping, prior, fitted)

@@ -588,10 +588,26 @@ pub(crate) fn preflight(
     loaded: &[Log],
     overlaps: &Overlaps,
 ) -> Result<Vec<Finding>, Error> {
-    if settings.preflight == Preflight::Off {
-        return Ok(Vec::new());
+    match bench_of(settings, robot)? {
+        Some(bench) => preflight_on(&bench, settings, loaded, overlaps),
+        None => Ok(Vec::new()),
     }
-    let findings = before::of_logs(settings, robot, loaded, overlaps)?;
+}
+
+/// What logs are examined with; `None` where they are not to be.
+pub(crate) fn bench_of(settings: &Settings, robot: &Robot) -> Result<Option<before::Bench>, Error> {
+    let on = settings.preflight != Preflight::Off;
+    on.then(|| before::Bench::new(settings, robot)).transpose()
+}
+
+/// [`preflight`] with what logs are examined with.
+pub(crate) fn preflight_on(
+    bench: &before::Bench,
+    settings: &Settings,
+    loaded: &[Log],
+    overlaps: &Overlaps,
+) -> Result<Vec<Finding>, Error> {
+    let findings = before::of_logs(bench, loaded, overlaps)?;
     match findings.iter().find(|f| f.severity == Severity::Error) {
         Some(fault) if settings.preflight == Preflight::Refuse => {
             Err(Error::PreflightFault(Box::new(fault.clone())))

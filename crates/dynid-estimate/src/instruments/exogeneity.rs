@@ -2,7 +2,7 @@
 
 use crate::covariance::jackknife as least_squares_jackknife;
 use crate::distribution::f_exceedance;
-use crate::least_squares::ols;
+use crate::least_squares::{ols, ols_values};
 use crate::oblique::{Oblique, jackknife, pair};
 use dynid_factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
@@ -213,8 +213,8 @@ fn naive_test(whole: &Factor, tested: &[usize]) -> Option<FTest> {
         return None;
     }
     let of_w: Vec<usize> = (0..p).collect();
-    let with = ols(&whole.select(&augmented(p, tested))).rss;
-    let without = ols(&whole.select(&of_w)).rss;
+    let (_, with) = ols_values(&whole.select(&augmented(p, tested)));
+    let (_, without) = ols_values(&whole.select(&of_w));
     let statistic = ((without - with).max(0.0) / m) / (with / freedom);
     Some(FTest { statistic, freedom: (m, freedom), p_value: f_exceedance(statistic, m, freedom)? })
 }

@@ -5,7 +5,7 @@ mod ridge;
 mod tls;
 mod wls;
 
-pub use ols::{LinearSolution, ols};
+pub use ols::{LinearSolution, ols, ols_values};
 pub use ridge::{RidgeSolution, ridge};
 pub(crate) use tls::{ColumnErrors, tls_groups};
 pub use tls::{TlsNoise, TlsRefusal, TlsSolution, tls};

@@ -1,7 +1,7 @@
 //! Ordinary least squares, `min ‖z - R x‖²`.
 
 use dynid_factor::factor::Factor;
-use dynid_factor::rank::{RankReport, numerical_rank};
+use dynid_factor::rank::{RankReport, certainly_full_rank, numerical_rank};
 use dynid_linalg::Mat;
 use dynid_linalg::triangular::gram_inverse;
 
@@ -88,4 +88,15 @@ pub fn ols(factor: &Factor) -> LinearSolution {
         rank,
         factor: reduced,
     }
+}
+
+/// Parameters and least residual sum of squares of [`ols`], the same bits without the evidence of its rank.
+///
+/// Singular values take most of the time of [`ols`]; here only factors need them that may be rank-deficient.
+pub fn ols_values(factor: &Factor) -> (Vec<f64>, f64) {
+    if certainly_full_rank(factor) {
+        return (factor.solve(), factor.rho() * factor.rho());
+    }
+    let LinearSolution { x, rss, .. } = ols(factor);
+    (x, rss)
 }

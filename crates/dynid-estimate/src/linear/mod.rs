@@ -19,5 +19,5 @@ pub use row_scores::{RowScores, row_scores};
 
 pub use crate::least_squares::{
     GroupVariance, LinearSolution, RidgeSolution, TlsNoise, TlsRefusal, TlsSolution, WlsEstimate,
-    WlsSettings, ols, ridge, tls, wls,
+    WlsSettings, ols, ols_values, ridge, tls, wls,
 };

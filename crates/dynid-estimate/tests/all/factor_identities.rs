@@ -1,7 +1,7 @@
 //! Identities of factors on random rows, and what bad rows are answered.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
-use dynid_estimate::linear::{WlsSettings, ols, wls};
+use dynid_estimate::linear::{WlsSettings, ols, ols_values, wls};
 use dynid_factor::rank::{base_columns, numerical_rank};
 use dynid_factor::{Factor, FactorBuilder, FactorError};
 use proptest::prelude::*;
@@ -108,6 +108,7 @@ proptest! {
     fn least_squares_leaves_no_gradient_whatever_the_rank(rows in rows()) {
         let factor = rows.factor(0..rows.y.len(), 16);
         let solution = ols(&factor);
+        prop_assert_eq!(ols_values(&factor), (solution.x.clone(), solution.rss));
         prop_assert!(solution.x.iter().all(|v| v.is_finite()));
         prop_assert_eq!(solution.kept.len(), solution.rank.rank);
         prop_assert_eq!(

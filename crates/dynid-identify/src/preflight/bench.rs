@@ -22,6 +22,7 @@ const PUSHED: (f64, f64) = (0.01, 0.01);
 pub(super) const UNEXPLAINED: f64 = 0.5;
 
 /// A robot as trial models need it.
+#[derive(Debug)]
 pub struct Bench {
     pub(super) model: RobotModel,
     pub(super) shape: Vec<f64>,

@@ -21,7 +21,6 @@ use crate::Error;
 pub use crate::finding::{Finding, FindingId, Findings, Fix, Severity};
 use crate::log::Log;
 use crate::overlap::{Overlap, Overlaps};
-use crate::robot::Robot;
 use crate::settings::Settings;
 pub use bench::Bench;
 pub use delay::Delay;
@@ -54,17 +53,11 @@ pub struct CheckedLog {
     pub excited: Option<[usize; 2]>,
 }
 
-/// Examines logs. `robot`: joints that are not logged are locked.
-pub fn of_logs(
-    settings: &Settings,
-    robot: &Robot,
-    logs: &[Log],
-    overlaps: &Overlaps,
-) -> Result<Vec<Finding>, Error> {
-    let bench = Bench::new(settings, robot)?;
+/// Examines logs. `bench`: of the robot with joints that are not logged locked.
+pub fn of_logs(bench: &Bench, logs: &[Log], overlaps: &Overlaps) -> Result<Vec<Finding>, Error> {
     let of_log = |(number, log): (usize, &Log)| {
         let mut findings = Findings { log: log.log.name(), number, list: Vec::new() };
-        examine(log, &bench, &mut findings)?;
+        examine(log, bench, &mut findings)?;
         Ok(findings.list)
     };
     let mut out = logs.par_iter().enumerate().map(of_log).collect::<Result<Vec<_>, Error>>()?.concat();

@@ -262,14 +262,17 @@ pub(super) fn gravity_size(
 
 /// Parameters that explain a wiring best, its efforts of any size: a prior of bodies would keep those of another unit small.
 fn at_any_size(trial: &Trial<'_>, wiring: &Wiring) -> Option<Vec<f64>> {
+    let explained = trial.parameters_by_size(wiring)?;
+    let (x, misfit) = explained(1.0)?;
+    if misfit <= CLEARLY.1 {
+        // Nothing can be so much better.
+        return Some(x);
+    }
     let sized = |factor: f64| {
-        let mut sized = wiring.clone();
-        sized.effort.iter_mut().for_each(|e| e.factor *= factor);
-        let (mut x, misfit) = trial.parameters(&sized)?;
+        let (mut x, misfit) = explained(factor)?;
         x.iter_mut().for_each(|x| *x /= factor);
         Some((x, misfit))
     };
-    let (x, misfit) = sized(1.0)?;
     let other = SIZES.into_iter().filter_map(sized).min_by(|a, b| a.1.total_cmp(&b.1));
     // As large a gain as a difference of columns must have: friction alone is of any size.
     let better = other.filter(|(_, other)| *other < CLEARLY.0 * misfit && misfit - other > CLEARLY.1);

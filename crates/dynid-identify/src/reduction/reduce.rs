@@ -12,7 +12,8 @@ use crate::caution::{self, Caution};
 use crate::fitting::conditioning_fault;
 use crate::log::{self, Log};
 use crate::overlap::Overlaps;
-use crate::pipeline::{log_cautions, preflight};
+use crate::pipeline::{bench_of, log_cautions, preflight_on};
+use crate::preflight::Bench;
 use crate::problem::Problem;
 use crate::settings::{LogSettings, labels};
 use crate::trained_log::TrainedLog;
@@ -26,6 +27,8 @@ pub struct Reducer {
     pub(super) recipe: Recipe,
     hash: String,
     pub(super) problem: Problem,
+    /// What logs are examined with, unless they are not to be.
+    bench: Option<Bench>,
     pub(super) windows: WindowSettings,
 }
 
@@ -52,7 +55,8 @@ impl Recipe {
     /// [`ReductionError::Contradiction`].
     pub fn reducer(self) -> Result<Reducer, Error> {
         let (problem, _) = self.problem()?;
-        Ok(Reducer { hash: self.hash(), problem, recipe: self, windows: WindowSettings::default() })
+        let bench = bench_of(&problem.settings, &problem.robot)?;
+        Ok(Reducer { hash: self.hash(), problem, bench, recipe: self, windows: WindowSettings::default() })
     }
 }
 
@@ -133,7 +137,10 @@ impl Reducer {
         }
         log::check_stated_temperatures(std::iter::once(&log.settings), model)?;
         let logs = [log];
-        let findings = preflight(settings, robot, &logs, &Overlaps::default())?;
+        let findings = match &self.bench {
+            Some(bench) => preflight_on(bench, settings, &logs, &Overlaps::default())?,
+            None => Vec::new(),
+        };
         let [log] = logs;
         let conditioned = ConditioningSettings {
             most_blocks: Some(self.recipe.blocks.most),

@@ -5,10 +5,10 @@ use dynid_model::{EffortModel, RegressorBlock};
 use super::PreflightError;
 use super::rows::{deviation, reduce, regressor, row_weight};
 use super::samples::{BLOCKS, Samples};
-use super::stated::fit;
+use super::stated::with_effort;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
-use dynid_estimate::linear::ols;
+use dynid_estimate::linear::ols_values;
 use dynid_factor::factor::Factor;
 
 /// Gauss-Newton steps.
@@ -234,7 +234,7 @@ fn is_seen(parts: &[Factor], kept: &[usize], all: usize) -> bool {
     (kept.len()..whole.columns()).all(|column| {
         let height = whole.height().min(column + 1);
         let power: f64 = (0..height).map(|row| whole.r(row, column).powi(2)).sum();
-        fit(&whole, column, column).rss > LEFT * LEFT * power
+        ols_values(&with_effort(&whole, column, column)).1 > LEFT * LEFT * power
     })
 }
 
@@ -254,10 +254,9 @@ fn solve(parts: &[Factor], without: Option<usize>, prior: &GaussianPrior<'_>, mo
     // Nothing is known of the unknown, but where the log does not tell it either it stays.
     weights.extend(std::iter::repeat_n(1e-3, more));
     centre.extend(std::iter::repeat_n(0.0, more));
-    let solution = ols(&Factor::merge(&kept).with_prior_rows(&weights, &centre));
-    let mut x = solution.x;
+    let (mut x, misfit) = ols_values(&Factor::merge(&kept).with_prior_rows(&weights, &centre));
     let more = x.split_off(prior.values.len());
-    Solved { x, more, misfit: solution.rss }
+    Solved { x, more, misfit }
 }
 
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

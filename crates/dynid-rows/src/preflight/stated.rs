@@ -64,10 +64,15 @@ pub fn against_stated(
 }
 
 /// Least squares of column `effort` on the first `columns`.
-pub(crate) fn fit(part: &Factor, columns: usize, effort: usize) -> LinearSolution {
+fn fit(part: &Factor, columns: usize, effort: usize) -> LinearSolution {
+    ols(&with_effort(part, columns, effort))
+}
+
+/// The first `columns` with column `effort` as their effort.
+pub(crate) fn with_effort(part: &Factor, columns: usize, effort: usize) -> Factor {
     let height = part.height();
     let entry = |i: usize, k: usize| if i < height { part.r(i, k) } else { 0.0 };
     let below = (columns..height).map(|i| part.r(i, effort).powi(2)).sum::<f64>().sqrt();
     let at = |i: usize, k: usize| if k < columns { entry(i, k) } else { entry(i, effort) };
-    ols(&Factor::from_triangle(columns, at, below, part.rows()))
+    Factor::from_triangle(columns, at, below, part.rows())
 }

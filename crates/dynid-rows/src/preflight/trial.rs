@@ -87,10 +87,23 @@ impl Trial<'_> {
 
     /// Standard parameters of bodies that can exist, as they explain a wiring best, with their misfit; `None` where there are none.
     pub fn parameters(&self, wiring: &Wiring) -> Option<(Vec<f64>, f64)> {
+        self.parameters_by_size(wiring)?(1.0)
+    }
+
+    /// [`Trial::parameters`] for a factor that all efforts are multiplied by; `None` where the rows cannot be formed.
+    pub fn parameters_by_size<'b>(
+        &'b self,
+        wiring: &'b Wiring,
+    ) -> Option<impl Fn(f64) -> Option<(Vec<f64>, f64)> + 'b> {
         let samples = self.samples_at(wiring.delay_s)?;
-        let factor = self.rows(&samples, wiring).ok()?.weighted(wiring);
-        let found = estimate(&(self.problem)(&factor), &self.settings()).ok()?;
-        Some((found.x, found.objective + factor.rho().powi(2)))
+        let rows = self.rows(&samples, wiring).ok()?;
+        Some(move |size: f64| {
+            let mut sized = wiring.clone();
+            sized.effort.iter_mut().for_each(|effort| effort.factor *= size);
+            let factor = rows.weighted(&sized);
+            let found = estimate(&(self.problem)(&factor), &self.settings()).ok()?;
+            Some((found.x, found.objective + factor.rho().powi(2)))
+        })
     }
 
     fn settings(&self) -> Settings {
