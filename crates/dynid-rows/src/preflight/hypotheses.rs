@@ -46,8 +46,8 @@ pub(super) fn of(
     samples: &Samples,
     wiring: &Wiring,
 ) -> Result<Vec<Rewiring>, PreflightError> {
-    let as_it_is = trial.refinement(samples).misfit(wiring)?;
-    let look = Look { trial, samples, wiring, worth: WORTH * as_it_is };
+    let as_it_is = trial.refinement(samples).fit(wiring)?;
+    let look = Look { trial, samples, wiring, worth: WORTH * as_it_is.misfit, values: as_it_is.x };
     let mut out = look.gravity()?;
     out.extend(look.zeros()?);
     out.extend(look.clock()?);
@@ -61,19 +61,25 @@ struct Look<'a> {
     wiring: &'a Wiring,
     /// Misfit that a hypothesis has to leave at most.
     worth: f64,
+    /// Parameters that explain the wiring best.
+    values: Vec<f64>,
 }
 
 impl Look<'_> {
     /// The wiring with the least misfit, if it is worth it.
     fn best(&self, wirings: Vec<Wiring>) -> Result<Option<Wiring>, PreflightError> {
         let problem = self.trial.refinement(self.samples);
-        let misfits = wirings.par_iter().map(|w| problem.misfit(w)).collect::<Result<Vec<f64>, _>>()?;
+        let misfits = wirings
+            .par_iter()
+            .map(|w| problem.fit(w).map(|fit| fit.misfit))
+            .collect::<Result<Vec<f64>, _>>()?;
         let least = wirings.into_iter().zip(misfits).min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(least.filter(|(_, misfit)| *misfit < self.worth).map(|(wiring, _)| wiring))
     }
 
     fn refined(&self, start: &Wiring, unknown: Unknown) -> Result<Option<Wiring>, PreflightError> {
-        let found = self.trial.refinement(self.samples).refine(start, unknown, self.worth)?;
+        let values = (start == self.wiring).then_some(self.values.as_slice());
+        let found = self.trial.refinement(self.samples).refine(start, unknown, self.worth, values)?;
         Ok(found.map(|f| f.wiring))
     }
 

@@ -8,6 +8,7 @@ use super::samples::{BLOCKS, Samples};
 use super::stated::with_effort;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
+use dynid_estimate::covariance::jackknife_by;
 use dynid_estimate::linear::ols_values;
 use dynid_factor::factor::Factor;
 
@@ -98,17 +99,25 @@ impl Problem<'_> {
         regressor(self.model, self.shape, self.samples, wiring)
     }
 
-    /// Misfit of a wiring with parameters that a Gaussian prior alone holds.
+    /// Parameters that a Gaussian prior alone holds, as they explain a wiring best, and their misfit.
     ///
     /// # Errors
     /// [`PreflightError`] if a regressor is not finite.
-    pub(crate) fn misfit(&self, wiring: &Wiring) -> Result<f64, PreflightError> {
-        let parts = self.parts(&self.block(wiring), &self.all(), wiring, &[], 1)?;
-        Ok(solve(&parts, None, &self.prior, 0).misfit)
+    pub(crate) fn fit(&self, wiring: &Wiring) -> Result<Solved, PreflightError> {
+        self.fit_block(&self.block(wiring), &self.all(), wiring)
+    }
+
+    fn fit_block(
+        &self,
+        block: &RegressorBlock,
+        columns: &KeptColumns,
+        wiring: &Wiring,
+    ) -> Result<Solved, PreflightError> {
+        Ok(solve(&merged(&self.parts(block, columns, wiring, &[], 1)?), &self.prior, 0))
     }
 
     /// Fits an unknown together with all parameters, from where a wiring has it; `None` where the log does not tell it.
-    /// `worth`: misfit that the first step has to promise.
+    /// `worth`: misfit that the first step has to promise; `values`: parameters that explain the start best, if they are known.
     ///
     /// # Errors
     /// [`PreflightError`] if a regressor is not finite.
@@ -117,16 +126,17 @@ impl Problem<'_> {
         start: &Wiring,
         unknown: Unknown,
         worth: f64,
+        values: Option<&[f64]>,
     ) -> Result<Option<Refined>, PreflightError> {
         let columns = self.all();
         let mut wiring = start.clone();
-        let mut values = None;
+        let mut values = values.map(<[f64]>::to_vec);
         for step in 1..=STEPS {
             let last = step == STEPS;
             let block = self.block(&wiring);
             let x = match values.take() {
                 Some(x) => x,
-                None => solve(&self.parts(&block, &columns, &wiring, &[], 1)?, None, &self.prior, 0).x,
+                None => self.fit_block(&block, &columns, &wiring)?.x,
             };
             // Rows that outweigh the prior by all digits leave a triangle that is singular.
             let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
@@ -147,10 +157,11 @@ impl Problem<'_> {
                 })
                 .collect();
             let parts = self.parts(&block, &columns, &wiring, &changes, BLOCKS)?;
-            if !is_seen(&parts, self.kept, columns.total) {
+            let whole = merged(&parts);
+            if !is_seen(&whole, self.kept, columns.total) {
                 return Ok(None);
             }
-            let Solved { x, more, misfit } = solve(&parts, None, &self.prior, unknown.count());
+            let Solved { x, more, misfit } = solve(&whole, &self.prior, unknown.count());
             if misfit > worth || !finite(&more) {
                 return Ok(None);
             }
@@ -162,17 +173,9 @@ impl Problem<'_> {
                 return Ok(Some(Refined { wiring, misfit, error: None }));
             }
             if settled {
-                let without: Vec<Vec<f64>> =
-                    (0..BLOCKS).map(|b| solve(&parts, Some(b), &self.prior, unknown.count()).more).collect();
-                let count = BLOCKS as f64;
-                let spread: f64 = (0..unknown.count())
-                    .map(|k| {
-                        let mean = without.iter().map(|a| a[k]).sum::<f64>() / count;
-                        without.iter().map(|a| (a[k] - mean).powi(2)).sum::<f64>()
-                    })
-                    .sum();
-                let error = ((count - 1.0) / count * spread).sqrt();
-                return Ok(Some(Refined { wiring, misfit, error: Some(error) }));
+                let without = |rest: &Factor| Some(solve(rest, &self.prior, unknown.count()).more);
+                let changes = jackknife_by(&parts, &more, without).map(|found| found.changes);
+                return Ok(Some(Refined { wiring, misfit, error: changes.map(|c| spread(&c)) }));
             }
         }
         Ok(None)
@@ -226,8 +229,7 @@ impl Problem<'_> {
 }
 
 /// Whether an unknown is anything but what the other parameters do: an offset takes the place of the tilt of a slide.
-fn is_seen(parts: &[Factor], kept: &[usize], all: usize) -> bool {
-    let whole = Factor::merge(&parts.iter().collect::<Vec<_>>());
+fn is_seen(whole: &Factor, kept: &[usize], all: usize) -> bool {
     let independent: Vec<usize> = kept.iter().copied().chain(all..whole.columns()).collect();
     let whole = whole.select(&independent);
     // Columns that the present gravity takes away leave the triangle singular.
@@ -238,23 +240,38 @@ fn is_seen(parts: &[Factor], kept: &[usize], all: usize) -> bool {
     })
 }
 
-struct Solved {
-    x: Vec<f64>,
-    more: Vec<f64>,
-    misfit: f64,
+fn merged(parts: &[Factor]) -> Factor {
+    Factor::merge(&parts.iter().collect::<Vec<_>>())
 }
 
-/// Parameters and what stands behind them, without one of the parts if it is given.
-fn solve(parts: &[Factor], without: Option<usize>, prior: &GaussianPrior<'_>, more: usize) -> Solved {
-    let kept: Vec<&Factor> =
-        parts.iter().enumerate().filter(|(b, _)| without != Some(*b)).map(|(_, f)| f).collect();
+/// Standard error by what leaving out one part after the other changes: the root of the sum over all components.
+fn spread(changes: &[Vec<f64>]) -> f64 {
+    let count = changes.len() as f64;
+    let of_component = |k: usize| {
+        let mean = changes.iter().map(|c| c[k]).sum::<f64>() / count;
+        changes.iter().map(|c| (c[k] - mean).powi(2)).sum::<f64>()
+    };
+    let components = changes.first().map_or(0, Vec::len);
+    ((count - 1.0) / count * (0..components).map(of_component).sum::<f64>()).sqrt()
+}
+
+/// Parameters that explain a log best, and what is left of it.
+pub(crate) struct Solved {
+    pub(crate) x: Vec<f64>,
+    /// What was fitted beside them.
+    more: Vec<f64>,
+    pub(crate) misfit: f64,
+}
+
+/// Parameters, and so many more behind them.
+fn solve(rows: &Factor, prior: &GaussianPrior<'_>, more: usize) -> Solved {
     let root = prior.weight.sqrt();
     let mut weights: Vec<f64> = prior.std.iter().map(|s| root / s).collect();
     let mut centre = prior.values.to_vec();
     // Nothing is known of the unknown, but where the log does not tell it either it stays.
     weights.extend(std::iter::repeat_n(1e-3, more));
     centre.extend(std::iter::repeat_n(0.0, more));
-    let (mut x, misfit) = ols_values(&Factor::merge(&kept).with_prior_rows(&weights, &centre));
+    let (mut x, misfit) = ols_values(&rows.with_prior_rows(&weights, &centre));
     let more = x.split_off(prior.values.len());
     Solved { x, more, misfit }
 }

@@ -33,7 +33,7 @@ pub fn tilt(trial: &Trial<'_>, wiring: &Wiring) -> Result<Option<Tilt>, Prefligh
     }
     let problem: Problem<'_> = trial.refinement(trial.samples);
     let start = Wiring { gravity: Some(wiring.gravity.unwrap_or(stated)), ..wiring.clone() };
-    let Some(found) = problem.refine(&start, Unknown::Gravity, f64::INFINITY)? else { return Ok(None) };
+    let Some(found) = problem.refine(&start, Unknown::Gravity, f64::INFINITY, None)? else { return Ok(None) };
     let Some(error) = found.error else { return Ok(None) };
     let gravity = found.wiring.gravity.unwrap_or(stated);
     let cosine = dot(gravity, stated) / (size * norm(gravity));
