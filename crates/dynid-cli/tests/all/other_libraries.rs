@@ -165,12 +165,23 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
     check(python, "welded links without mass", &welded, |name, identified, truth| {
         if name.starts_with("ram.") { 0.3 * truth } else { lively(name, identified, truth) }
     });
+    of_public_files(python, &["ur5"]);
+}
+
+fn of_public_files(python: &Path, robots: &[&str]) {
     let Some(oracles) = shared_if_there("data/oracles") else { return };
-    for robot in ["ur5", "iiwa14", "panda"] {
+    for robot in robots {
         let file = oracles.join(format!("{robot}.urdf"));
         check(python, robot, &file, lively);
         check(python, &format!("{robot} as identified"), &file, |_, identified, _| identified);
     }
+}
+
+#[test]
+#[ignore = "ten seconds; the ordinary run takes the UR5"]
+fn more_public_robots_give_the_effort_of_the_estimate() {
+    let Some(python) = python() else { return skip("a Python with the modules pinocchio and mujoco") };
+    of_public_files(python, &["iiwa14", "panda"]);
 }
 
 #[test]

@@ -123,6 +123,7 @@ fn stiffness_of_the_flexible_joint_is_found_and_its_wear_is_named() {
 }
 
 #[test]
+#[ignore = "six seconds; the ordinary run takes the commands on a mechanism with clearance"]
 fn probes_at_the_journals_of_the_xy_mechanism_are_worth_ten_times_an_ideal_model() {
     let folder = run("xy-pointing");
     let out = folder.path().join("xy-run");

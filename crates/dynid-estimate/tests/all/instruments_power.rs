@@ -287,6 +287,7 @@ fn rejections(noise: Noise, route: (f64, usize)) -> (f64, f64, f64) {
 /// Noise in the controller's readings alone moves the joint, which the log records exactly: instruments miss that motion, and
 /// least squares is right to use it.
 #[test]
+#[ignore = "four seconds; the ordinary run finds noise that is fed back"]
 fn a_true_null_is_rejected_at_the_nominal_rate() {
     let noise = Noise { loop_: NOISE, logged: false, effort: EFFORT_NOISE };
     let (rejected, _, material) = rejections(noise, NARROW);

@@ -118,16 +118,25 @@ fn stribeck_friction_is_found_where_it_is() {
 
 #[test]
 fn linear_friction_asks_for_no_shape() {
-    let (mut false_shapes, logs) = (0, 10);
-    for seed in 0..logs {
+    let found = shapes_of_linear_friction(4);
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+#[ignore = "five seconds; the ordinary run takes four logs"]
+fn linear_friction_of_many_logs_asks_for_no_shape() {
+    let found = shapes_of_linear_friction(10);
+    assert!(found.len() <= 1, "{found:?}");
+}
+
+/// Shapes that are found on so many logs of six joints without any.
+fn shapes_of_linear_friction(logs: u64) -> Vec<String> {
+    let of_log = |seed: u64| {
         let found = Case::new(20.0, seed, None, |_, _, _| 0.0, |_| true).choose(&ALL);
-        for choice in &found.per_output {
-            false_shapes += choice.accepted.len();
-            choice.accepted.iter().for_each(|a| println!("log {seed}: {a:?}"));
-        }
-    }
-    println!("{false_shapes} false shapes on {} joints", logs as usize * JOINTS);
-    assert!(false_shapes <= 1, "{false_shapes}");
+        let accepted = found.per_output.into_iter().flat_map(|choice| choice.accepted);
+        accepted.map(|a| format!("log {seed}: {a:?}")).collect::<Vec<_>>()
+    };
+    (0..logs).flat_map(of_log).collect()
 }
 
 #[test]

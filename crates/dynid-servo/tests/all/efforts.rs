@@ -38,7 +38,7 @@ fn truth(seed: u64) -> Vec<ServoJoint> {
 
 /// Machines of the statistical tests: few by default, `DYNID_MACHINES` of them where they are to be counted.
 fn machines() -> u64 {
-    std::env::var("DYNID_MACHINES").ok().and_then(|n| n.parse().ok()).unwrap_or(8)
+    std::env::var("DYNID_MACHINES").ok().and_then(|n| n.parse().ok()).unwrap_or(4)
 }
 
 /// Intervals of 95 % hold, as far as so few machines can say.

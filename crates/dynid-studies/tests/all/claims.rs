@@ -99,6 +99,7 @@ fn rows_that_depend_on_the_seed_are_marked() {
 }
 
 #[test]
+#[ignore = "six seconds; the ordinary run takes the ER-16"]
 fn hit_joint_holds_every_claim() {
     let folder = tempfile::tempdir().unwrap();
     let ids = holds_every_claim("hit-joint", &quick("hit-joint", folder.path(), "out", "2"));

@@ -154,6 +154,7 @@ fn the_indy7_keeps_its_links_apart_and_above_the_floor() {
 }
 
 #[test]
+#[ignore = "ten seconds; the ordinary run takes the Indy7"]
 fn robots_of_public_files_keep_their_links_apart_and_above_the_floor() {
     for file in ["data/ur10e-innopolis/ur10e.urdf", "data/oracles/iiwa14.urdf"] {
         let Some(path) = shared(file) else { return };
