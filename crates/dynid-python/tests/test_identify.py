@@ -111,6 +111,19 @@ def test_logs_of_tables(indy7: dynid.Robot, made: dynid.Simulation, found: dynid
     assert list(found.parameters.to_pandas().columns)[0] == "name"
 
 
+def test_paths_stand_for_logs() -> None:
+    folder = ROOT / "examples" / "indy7"
+    robot, train, valid = dynid.Robot.load(folder / "robot.toml"), folder / "train.csv.gz", folder / "valid.csv.gz"
+    read = dynid.identify(robot, dynid.Log.read(train), validation=dynid.Log.read(valid))
+    assert dynid.identify(robot, str(train), validation=[valid]).to_json() == read.to_json()
+    assert repr(dynid.check(robot, [train])) == repr(dynid.check(robot, dynid.Log.read(train)))
+    assert read.validate(valid) == read.validate(dynid.Log.read(valid))
+    with pytest.raises(dynid.LogError, match="nowhere.csv"):
+        dynid.identify(robot, "nowhere.csv")
+    with pytest.raises(dynid.SettingError, match="columns"):
+        dynid.identify(robot, train, columns={"position": "q{}"})
+
+
 def test_bad_input_is_told(indy7: dynid.Robot, made: dynid.Simulation) -> None:
     log = made.log
     with pytest.raises(dynid.SettingError, match="unknown field `methd`"):
@@ -137,8 +150,10 @@ def test_bad_input_is_told(indy7: dynid.Robot, made: dynid.Simulation) -> None:
             indy7.inverse_dynamics(**arguments)
     with pytest.raises(ValueError, match="t: expected"):
         dynid.Log(np.zeros((2, 2)), made.q, made.tau)
-    with pytest.raises(TypeError):
-        dynid.identify(indy7, 3)  # type: ignore[arg-type]
+    tables: list[Any] = [3, None, made.q, {"t": made.t}, [{"t": made.t}], Stream(None)]
+    for no_log in tables:
+        with pytest.raises(TypeError, match="a `dynid.Log` or the path of one, found"):
+            dynid.identify(indy7, no_log)
 
 
 def test_progress_and_interrupt(indy7: dynid.Robot, made: dynid.Simulation) -> None:

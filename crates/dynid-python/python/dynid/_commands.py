@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._estimate import Factor, Progress, native_logs, teller, written
-from ._log import Log
+from ._log import LogOrPath
 from ._servo import Servo
 from ._robot_file import robot_keys
 from ._settings import as_json
 from ._table import Table
 
 
-def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> Table:
+def check(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], **settings: Any) -> Table:
     """What is wrong with logs before anything is identified: a row per finding, none for logs that nothing speaks against.
 
     Columns: `severity` (`error`: an identification would be nonsense), `id` (`dynid explain ID` says more), `log`, `joint`, `evidence`, `remedy`.
@@ -76,7 +76,7 @@ class Comparison:
         return f"<dynid.Comparison>\n{self.estimators!r}"
 
 
-def compare(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
+def compare(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
     """Compares estimators on the same logs: each is fitted to all folds of time but one, and predicts that one.
 
     `settings` as for `identify`, but that every estimator takes its own method; kernel, masks and delay are chosen once for all estimators. One that fails is in the table, with the reason.
@@ -115,7 +115,7 @@ class Gains:
         return f"<dynid.Gains by {self.record['payload']} of {self.record['mass']} kg>\n{self.joints!r}"
 
 
-def gains(robot: _native.Robot, logs: Log | Iterable[Log], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Gains:
+def gains(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Gains:
     """Finds what a unit of logged effort (a current in A, say) is in N m or N, from logs with and without a payload of known mass.
 
     `logs`: `Log(..., payload="tool")` for those that carry it. `settings`: `payload=[{"name": "tool", "mass": 2.0, "com": [0, 0, 0.1]}]`, and

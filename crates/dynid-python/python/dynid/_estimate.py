@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _models, _native
-from ._log import Log
+from ._log import LogOrPath, as_list, as_log
 from ._settings import as_json
 from ._table import Table
 
@@ -26,9 +26,9 @@ _PARAMETERS = ("name", "unit", "value", "std", "low", "high", "verdict", "combin
 _BASE = ("name", "expression", "unit", "value", "std", "half_width", "verdict", "consistent_value")
 
 
-def native_logs(logs: Log | Iterable[Log]) -> list[_native.Log]:
+def native_logs(logs: LogOrPath | Iterable[LogOrPath]) -> list[_native.Log]:
     """One log or several, as what is compiled knows them."""
-    return [log._native for log in ([logs] if isinstance(logs, Log) else logs)]
+    return [as_log(log)._native for log in as_list(logs)]
 
 
 def teller(progress: Progress) -> Callable[[str], object] | None:
@@ -151,7 +151,7 @@ class Estimate:
         """Efforts of one state, for a controller: `predict` by another name."""
         return self._native.predict(q, v, a)
 
-    def validate(self, logs: Log | Iterable[Log], *, unconstrained: bool = False, filter_hz: float | None = None) -> list[dict[str, Any]]:
+    def validate(self, logs: LogOrPath | Iterable[LogOrPath], *, unconstrained: bool = False, filter_hz: float | None = None) -> list[dict[str, Any]]:
         """Predicted against measured efforts of other logs: per log the figures of `validation` in `estimate.json`."""
         text = self._native.validate(native_logs(logs), unconstrained=unconstrained, filter_hz=filter_hz)
         fits: list[dict[str, Any]] = json.loads(text)
@@ -206,7 +206,7 @@ class Estimate:
         (`Robot.from_mujoco`, `Robot.from_pinocchio`)."""
         return _models.apply(self.record, model)
 
-    def reduce(self, logs: Log | Iterable[Log]) -> Factor:
+    def reduce(self, logs: LogOrPath | Iterable[LogOrPath]) -> Factor:
         """Reduces logs by the choices of this identification to a `Factor`."""
         return Factor(_native.Factor.of(self._native, native_logs(logs)))
 
@@ -256,11 +256,11 @@ class Factor:
     def __add__(self, other: Factor) -> Factor:
         return Factor.merge([self, other])
 
-    def reduce(self, logs: Log | Iterable[Log]) -> Factor:
+    def reduce(self, logs: LogOrPath | Iterable[LogOrPath]) -> Factor:
         """Reduces other logs by the recipe inside."""
         return Factor(self._native.reduce(native_logs(logs)))
 
-    def solve(self, validation: Log | Iterable[Log] = (), *, progress: Progress = None, threads: int = 0) -> Estimate:
+    def solve(self, validation: LogOrPath | Iterable[LogOrPath] = (), *, progress: Progress = None, threads: int = 0) -> Estimate:
         """The estimate of all logs inside."""
         return Estimate(self._native.solve(native_logs(validation), progress=teller(progress), threads=threads))
 
@@ -278,15 +278,16 @@ class Factor:
 
 def identify(
     robot: _native.Robot,
-    logs: Log | Iterable[Log],
+    logs: LogOrPath | Iterable[LogOrPath],
     *,
-    validation: Log | Iterable[Log] = (),
+    validation: LogOrPath | Iterable[LogOrPath] = (),
     progress: Progress = None,
     threads: int = 0,
     **settings: Any,
 ) -> Estimate:
     """Identifies a robot from logs: examines them, conditions, fits, judges, validates.
 
+    `logs`: `Log`s, or paths of files that need no more to be said of them (`Log.read` says it).
     `settings` are the tables of a configuration: `elements={"friction": "stribeck"}`, `estimator={"method": "iv"}`,
     `tie=[["j1", "j2"]]`, `payload=[{"name": "tool"}]`, ... A setting that is unknown or without effect raises `SettingError`.
     The same robot, logs and settings give the bits of `dynid identify`, whatever `threads` (0: all cores).

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from . import _native
 from ._estimate import Progress, teller, written
-from ._log import Log
+from ._log import Log, LogOrPath, as_list, as_log
 from ._settings import as_json
 from ._table import Table
 
@@ -99,7 +99,7 @@ class Friction:
 
 def friction(
     robot: _native.Robot,
-    logs: Log | FrictionLog | Iterable[Log | FrictionLog],
+    logs: LogOrPath | FrictionLog | Iterable[LogOrPath | FrictionLog],
     presliding: PreslidingLog | Iterable[PreslidingLog] = (),
     *,
     progress: Progress = None,
@@ -120,8 +120,8 @@ def friction(
     clash = {"robot", "log", "presliding", "columns", "out"} & set(settings)
     if clash:
         raise TypeError(f"settings: {', '.join(sorted(clash))}: robot and logs are arguments, columns belong to `Log.read`, results are values")
-    steady = [logs] if isinstance(logs, (Log, FrictionLog)) else list(logs)
-    tests = [FrictionLog(test) if isinstance(test, Log) else test for test in steady]
+    steady = [logs] if isinstance(logs, FrictionLog) else as_list(logs)
+    tests = [test if isinstance(test, FrictionLog) else FrictionLog(as_log(test)) for test in steady]
     slow = [presliding] if isinstance(presliding, PreslidingLog) else list(presliding)
 
     def entries(given: Iterable[FrictionLog | PreslidingLog]) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -113,6 +113,30 @@ def find_logs(path: str | os.PathLike[str]) -> list[str]:
     Raises `LogError` if there is none.
     """
     return [str(log) for log in _native.find_logs(os.fspath(path))]
+
+
+LogOrPath = Log | str | os.PathLike[str]
+"""A log, or the path of one that `Log.read` reads as it is."""
+
+
+def as_log(given: object) -> Log:
+    """A log that was given as such or by its path; anything else is a `TypeError` that says how a log is made of it."""
+    if isinstance(given, Log):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return Log.read(given)
+    raise TypeError(
+        f"logs: expected a `dynid.Log` or the path of one, found {type(given).__name__}; "
+        "a log of arrays is `dynid.Log(t, q, tau)`, of a table `dynid.Log.from_table(table)`"
+    )
+
+
+def as_list(given: object) -> list[Any]:
+    """What was given, one log or several; a table is one thing, though its columns can be gone through."""
+    table = isinstance(given, Mapping) or any(hasattr(given, of_table) for of_table in ("columns", "dtype", "__arrow_c_stream__"))
+    if isinstance(given, Iterable) and not table and not isinstance(given, (str, os.PathLike)):
+        return list(given)
+    return [given]
 
 
 def read_columns(
