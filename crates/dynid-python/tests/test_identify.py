@@ -111,11 +111,25 @@ def test_logs_of_tables(indy7: dynid.Robot, made: dynid.Simulation, found: dynid
     assert list(found.parameters.to_pandas().columns)[0] == "name"
 
 
-def test_paths_stand_for_logs() -> None:
+def test_paths_stand_for_robots_and_logs() -> None:
     folder = ROOT / "examples" / "indy7"
     robot, train, valid = dynid.Robot.load(folder / "robot.toml"), folder / "train.csv.gz", folder / "valid.csv.gz"
     read = dynid.identify(robot, dynid.Log.read(train), validation=dynid.Log.read(valid))
     assert dynid.identify(robot, str(train), validation=[valid]).to_json() == read.to_json()
+    assert dynid.identify(folder / "robot.toml", train, validation=valid).to_json() == read.to_json()
+    file = str(folder / "robot.toml")
+    assert dynid.read_columns(train, file).keys() == dynid.read_columns(train, robot).keys()
+    by_path, by_value = (dynid.simulate(of, duration_s=2.0, rate_hz=100.0).q for of in (file, robot))
+    assert np.array_equal(by_path, by_value)
+    dynid.Online(file)
+    with pytest.raises(dynid.RobotError, match="nowhere.urdf"):
+        dynid.check("nowhere.urdf", train)
+    no_robot: Any = {"name": "arm"}
+    for call in (dynid.identify, dynid.check, dynid.servo, dynid.friction):
+        with pytest.raises(TypeError, match="a `dynid.Robot` or the path of one, found dict"):
+            call(no_robot, train)
+    with pytest.raises(TypeError, match="found dict"):
+        dynid.design(no_robot)
     assert repr(dynid.check(robot, [train])) == repr(dynid.check(robot, dynid.Log.read(train)))
     assert read.validate(valid) == read.validate(dynid.Log.read(valid))
     with pytest.raises(dynid.LogError, match="nowhere.csv"):

@@ -16,18 +16,18 @@ from . import _native
 from ._estimate import Factor, Progress, native_logs, teller, written
 from ._log import LogOrPath
 from ._servo import Servo
-from ._robot_file import robot_keys
+from ._robot_file import RobotOrPath, as_robot, robot_keys
 from ._settings import as_json
 from ._table import Table
 
 
-def check(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], **settings: Any) -> Table:
+def check(robot: RobotOrPath, logs: LogOrPath | Iterable[LogOrPath], **settings: Any) -> Table:
     """What is wrong with logs before anything is identified: a row per finding, none for logs that nothing speaks against.
 
     Columns: `severity` (`error`: an identification would be nonsense), `id` (`dynid explain ID` says more), `log`, `joint`, `evidence`, `remedy`.
     What no joint does, angles in degrees for example, raises `LogError`, as in `identify`.
     """
-    rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), as_json(settings)))
+    rows: list[dict[str, Any]] = json.loads(_native.check(as_robot(robot), native_logs(logs), as_json(settings)))
     return Table.of_rows(rows, ("severity", "id", "log", "joint", "evidence", "remedy"))
 
 
@@ -76,12 +76,12 @@ class Comparison:
         return f"<dynid.Comparison>\n{self.estimators!r}"
 
 
-def compare(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
+def compare(robot: RobotOrPath, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Comparison:
     """Compares estimators on the same logs: each is fitted to all folds of time but one, and predicts that one.
 
     `settings` as for `identify`, but that every estimator takes its own method; kernel, masks and delay are chosen once for all estimators. One that fails is in the table, with the reason.
     """
-    text, page = _native.compare(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads)
+    text, page = _native.compare(as_robot(robot), native_logs(logs), as_json(settings), progress=teller(progress), threads=threads)
     return Comparison(text, page)
 
 
@@ -115,13 +115,13 @@ class Gains:
         return f"<dynid.Gains by {self.record['payload']} of {self.record['mass']} kg>\n{self.joints!r}"
 
 
-def gains(robot: _native.Robot, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Gains:
+def gains(robot: RobotOrPath, logs: LogOrPath | Iterable[LogOrPath], *, progress: Progress = None, threads: int = 0, **settings: Any) -> Gains:
     """Finds what a unit of logged effort (a current in A, say) is in N m or N, from logs with and without a payload of known mass.
 
     `logs`: `Log(..., payload="tool")` for those that carry it. `settings`: `payload=[{"name": "tool", "mass": 2.0, "com": [0, 0, 0.1]}]`, and
     those of `identify` that gains depend on; others are refused. No pre-flight is made (`check` makes it). A drive on which the load does not act is an outcome (`verdict`), not an error.
     """
-    return Gains(_native.gains(robot, native_logs(logs), as_json(settings), progress=teller(progress), threads=threads))
+    return Gains(_native.gains(as_robot(robot), native_logs(logs), as_json(settings), progress=teller(progress), threads=threads))
 
 
 class Design:
@@ -157,7 +157,7 @@ class Design:
         return f"<dynid.Design of {', '.join(self.joints) or 'nothing'}>\n{self.headline}"
 
 
-def design(robot: _native.Robot, *, progress: Progress = None, threads: int = 0, **settings: Any) -> Design:
+def design(robot: RobotOrPath, *, progress: Progress = None, threads: int = 0, **settings: Any) -> Design:
     """Designs an excitation trajectory within the limits of robot and surroundings.
 
     `settings` are the tables of a design file: `trajectory={"period_s": 10, "harmonics": 5}`, `limits={"share": 0.8}`, `keep=[...]`,
@@ -170,7 +170,7 @@ def design(robot: _native.Robot, *, progress: Progress = None, threads: int = 0,
             path = Path(folder) / "servo.json"
             path.write_text(drives.to_json(), encoding="utf-8")
             settings = {**settings, "drives": str(path)}
-        with robot_keys(robot, settings) as config:
+        with robot_keys(as_robot(robot), settings) as config:
             return Design(_native.design(config, progress=teller(progress), threads=threads))
 
 
@@ -199,7 +199,7 @@ class NextMotion(Design):
 
 
 def next_motion(
-    robot: _native.Robot,
+    robot: RobotOrPath,
     after: Factor | Iterable[Factor],
     want: Mapping[str, float | str],
     *,
@@ -217,7 +217,7 @@ def next_motion(
     """
     factors = [after] if isinstance(after, Factor) else list(after)
     wanted = [f"{name}={width}" for name, width in want.items()]
-    with robot_keys(robot, settings) as config:
+    with robot_keys(as_robot(robot), settings) as config:
         natives = [factor._native for factor in factors]
         return NextMotion(_native.next_motion(config, natives, wanted, longest_s, progress=teller(progress), threads=threads))
 
@@ -238,12 +238,13 @@ class Online:
     them. The first stretch is learned from; estimates come from then on.
     """
 
-    def __init__(self, robot: _native.Robot, *, joints: Sequence[str] | None = None, velocity: bool = False, **settings: Any) -> None:
+    def __init__(self, robot: RobotOrPath, *, joints: Sequence[str] | None = None, velocity: bool = False, **settings: Any) -> None:
+        robot = as_robot(robot)
         self._names = list(robot.joints if joints is None else joints)
         self._velocity = velocity
         prefixes = ["q", *(["dq"] if velocity else []), "tau"]
         header = ["t", *(f"{prefix}_{joint}" for prefix in prefixes for joint in self._names)]
-        with robot_keys(robot, settings) as config:
+        with robot_keys(as_robot(robot), settings) as config:
             self._native = _native.Online(config, header)
 
     @property

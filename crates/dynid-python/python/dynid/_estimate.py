@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _models, _native
 from ._log import LogOrPath, as_list, as_log
+from ._robot_file import RobotOrPath, as_robot
 from ._settings import as_json
 from ._table import Table
 
@@ -54,9 +55,9 @@ class Estimate:
         self._record: dict[str, Any] | None = None
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], robot: _native.Robot | None = None) -> Estimate:
+    def load(cls, path: str | os.PathLike[str], robot: RobotOrPath | None = None) -> Estimate:
         """An `estimate.json`. `robot`: where the robot was made of a text or another library's model, for exports and `validate`."""
-        return cls(_native.Estimate.parse(Path(path).read_bytes(), robot))
+        return cls(_native.Estimate.parse(Path(path).read_bytes(), None if robot is None else as_robot(robot)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes `estimate.json`; the file appears whole or not at all."""
@@ -277,7 +278,7 @@ class Factor:
 
 
 def identify(
-    robot: _native.Robot,
+    robot: RobotOrPath,
     logs: LogOrPath | Iterable[LogOrPath],
     *,
     validation: LogOrPath | Iterable[LogOrPath] = (),
@@ -287,7 +288,7 @@ def identify(
 ) -> Estimate:
     """Identifies a robot from logs: examines them, conditions, fits, judges, validates.
 
-    `logs`: `Log`s, or paths of files that need no more to be said of them (`Log.read` says it).
+    `robot`, `logs`: values, or paths of files that need no more to be said of them (`Robot.load` and `Log.read` say it).
     `settings` are the tables of a configuration: `elements={"friction": "stribeck"}`, `estimator={"method": "iv"}`,
     `tie=[["j1", "j2"]]`, `payload=[{"name": "tool"}]`, ... A setting that is unknown or without effect raises `SettingError`.
     The same robot, logs and settings give the bits of `dynid identify`, whatever `threads` (0: all cores).
@@ -295,7 +296,7 @@ def identify(
     An interrupt ends the wait at once and leaves nothing behind.
     """
     text = as_json(settings)
-    found = _native.identify(robot, native_logs(logs), native_logs(validation), text, progress=teller(progress), threads=threads)
+    found = _native.identify(as_robot(robot), native_logs(logs), native_logs(validation), text, progress=teller(progress), threads=threads)
     return Estimate(found)
 
 

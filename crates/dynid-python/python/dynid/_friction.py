@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 from . import _native
 from ._estimate import Progress, teller, written
 from ._log import Log, LogOrPath, as_list, as_log
+from ._robot_file import RobotOrPath, as_robot
 from ._settings import as_json
 from ._table import Table
 
@@ -98,7 +99,7 @@ class Friction:
 
 
 def friction(
-    robot: _native.Robot,
+    robot: RobotOrPath,
     logs: LogOrPath | FrictionLog | Iterable[LogOrPath | FrictionLog],
     presliding: PreslidingLog | Iterable[PreslidingLog] = (),
     *,
@@ -129,4 +130,4 @@ def friction(
 
     text = as_json({**settings, "log": entries(tests), "presliding": entries(slow)})
     natives = [test.log._native for test in tests], [test.log._native for test in slow]
-    return Friction(*_native.friction(robot, natives[0], natives[1], text, progress=teller(progress), threads=threads))
+    return Friction(*_native.friction(as_robot(robot), natives[0], natives[1], text, progress=teller(progress), threads=threads))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._arrow import columns
+from ._robot_file import RobotOrPath, as_robot
 from ._settings import as_json
 
 
@@ -141,7 +142,7 @@ def as_list(given: object) -> list[Any]:
 
 def read_columns(
     path: str | os.PathLike[str],
-    robot: _native.Robot | None = None,
+    robot: RobotOrPath | None = None,
     *,
     columns: Mapping[str, Any] | None = None,
     rows: tuple[int, int] | None = None,
@@ -154,7 +155,7 @@ def read_columns(
 
     Raises `LogError` for a file that cannot be read.
     """
-    return _native.read_columns(os.fspath(path), robot, columns=as_json(dict(columns or {})), rows=rows)
+    return _native.read_columns(os.fspath(path), None if robot is None else as_robot(robot), columns=as_json(dict(columns or {})), rows=rows)
 
 
 class Simulation:
@@ -184,10 +185,10 @@ class Simulation:
         return Log(self.t, self.q, self.tau, self.v, joints=self.joints, channels=self.channels, name="virtual")
 
 
-def simulate(robot: _native.Robot, **settings: Any) -> Simulation:
+def simulate(robot: RobotOrPath, **settings: Any) -> Simulation:
     """Makes a virtual log; `settings` are the keys of `dynid simulate --config`: `duration_s`, `rate_hz`, `seed`, `effort_noise`,
     `encoder_bits`, `mode="closed_loop"`, ...
 
     Raises `SettingError` for a setting that is unknown or out of range.
     """
-    return Simulation(_native.simulate(robot, as_json(settings)))
+    return Simulation(_native.simulate(as_robot(robot), as_json(settings)))

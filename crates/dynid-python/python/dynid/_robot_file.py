@@ -1,4 +1,4 @@
-"""Robots on their way to work that takes them by their file."""
+"""Robots as they are given, and on their way to work that takes them by their file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,22 @@ from typing import Any
 
 from . import _native
 from ._settings import as_json
+
+
+RobotOrPath = _native.Robot | str | os.PathLike[str]
+"""A robot, or the path of one that `Robot.load` reads as it is."""
+
+
+def as_robot(given: object) -> _native.Robot:
+    """A robot that was given as such or by its path; anything else is a `TypeError` that says how a robot is made of it."""
+    if isinstance(given, _native.Robot):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return _native.Robot.load(given)
+    raise TypeError(
+        f"robot: expected a `dynid.Robot` or the path of one, found {type(given).__name__}; "
+        "a robot of Pinocchio's model is `dynid.Robot.from_pinocchio(model)`, of MuJoCo's `dynid.Robot.from_mujoco(model)`"
+    )
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._estimate import Progress, teller, written
-from ._robot_file import robot_path
+from ._robot_file import RobotOrPath, as_robot, robot_path
 from ._settings import as_json
 from ._table import Table
 
@@ -155,7 +155,7 @@ def _listed(given: LogOfCommands | Iterable[LogOfCommands]) -> list[LogOfCommand
 
 
 def servo(
-    robot: _native.Robot,
+    robot: RobotOrPath,
     logs: LogOfCommands | Iterable[LogOfCommands],
     validation: LogOfCommands | Iterable[LogOfCommands] = (),
     *,
@@ -174,6 +174,7 @@ def servo(
 
     Raises `LogError` for logs that cannot be used, `SettingError` for a setting that is unknown or out of range.
     """
+    robot = as_robot(robot)
     options = json.loads(robot.options)
     training, judged = _listed(logs), _listed(validation)
     told = dict(command or {})
