@@ -11,7 +11,7 @@ use dynid::gains::gains_of_logs;
 use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
 use dynid::pipeline::held_where_not_logged;
-use dynid::preflight;
+use dynid::preflight::{self, Bench};
 use dynid::reduce::Reduction;
 use dynid::servo::{ServoConfig, ServoStep, identify_servo};
 use dynid::settings::Method;
@@ -41,7 +41,7 @@ pub(crate) fn check(
     let findings = work::run(py, None, 0, move |_| {
         let logs = logs.iter().map(|log| log.of(&own.axes, false)).collect::<Result<Vec<_>, _>>()?;
         let held = held_where_not_logged(own, &logs)?;
-        preflight::of_logs(&settings, &held, &logs, &Overlaps::of(&logs, &[]))
+        preflight::of_logs(&Bench::new(&settings, &held)?, &logs, &Overlaps::of(&logs, &[]))
     })?;
     as_json(&findings)
 }
