@@ -99,7 +99,14 @@ def test_experiments_give_the_law_and_the_bristles_that_files_give(tmp_path: Pat
                 del part["log"]
         return json.dumps(record["joints"])
 
-    assert numbers(told) == numbers(found.record), ended.stderr
+    of_files = numbers(told)
+    assert of_files == numbers(found.record), ended.stderr
+    of_paths = dynid.friction(
+        tmp_path / "pair.toml",
+        [tmp_path / "a.csv", dynid.FrictionLog(str(tmp_path / "b.csv"), "j1")],
+        dynid.PreslidingLog(tmp_path / "slow.csv", "j1", INERTIA),
+    )
+    assert of_files == numbers(of_paths.record)
 
     # What it leaves behind stands in an identification.
     found.save(tmp_path / "friction.json")

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
 from . import _native
-from ._estimate import Progress, teller, written
-from ._log import Log, LogOrPath, as_list, as_log
+from ._estimate import Progress, native_logs, teller, written
+from ._log import LogOrPath, as_list
 from ._robot_file import RobotOrPath, as_robot
 from ._settings import as_json
 from ._table import Table
@@ -22,7 +22,7 @@ class FrictionLog(NamedTuple):
     already, that is efforts less a model of everything else. Temperatures are channels of the log, `temperature_<joint>` in °C.
     """
 
-    log: Log
+    log: LogOrPath
     joint: str | None = None
     signal: Literal["effort", "friction"] = "effort"
 
@@ -34,7 +34,7 @@ class PreslidingLog(NamedTuple):
     between its samples (`auto`: whichever fits better).
     """
 
-    log: Log
+    log: LogOrPath
     joint: str
     inertia: float
     offset: float = 0.0
@@ -122,12 +122,12 @@ def friction(
     if clash:
         raise TypeError(f"settings: {', '.join(sorted(clash))}: robot and logs are arguments, columns belong to `Log.read`, results are values")
     steady = [logs] if isinstance(logs, FrictionLog) else as_list(logs)
-    tests = [test if isinstance(test, FrictionLog) else FrictionLog(as_log(test)) for test in steady]
+    tests = [test if isinstance(test, FrictionLog) else FrictionLog(test) for test in steady]
     slow = [presliding] if isinstance(presliding, PreslidingLog) else list(presliding)
 
     def entries(given: Iterable[FrictionLog | PreslidingLog]) -> list[dict[str, Any]]:
         return [{key: value for key, value in test._asdict().items() if key != "log" and value is not None} for test in given]
 
     text = as_json({**settings, "log": entries(tests), "presliding": entries(slow)})
-    natives = [test.log._native for test in tests], [test.log._native for test in slow]
+    natives = native_logs(test.log for test in tests), native_logs(test.log for test in slow)
     return Friction(*_native.friction(as_robot(robot), natives[0], natives[1], text, progress=teller(progress), threads=threads))
