@@ -55,13 +55,14 @@ macro_rules! function {
                 $value
             }
             #[inline(always)]
-            #[allow(unused_variables, reason = "some derivatives need the value alone, some not")]
             fn slope(self, $x: f64, $f: f64) -> f64 {
+                // Some derivatives need the value alone, some not.
+                let _ = ($x, $f);
                 $slope
             }
             #[inline(always)]
-            #[allow(unused_variables, reason = "some derivatives need the value alone, some not")]
             fn bend(self, $x: f64, $f: f64) -> f64 {
+                let _ = ($x, $f);
                 $bend
             }
         }

@@ -90,7 +90,8 @@ pub fn ols(factor: &Factor) -> LinearSolution {
     }
 }
 
-/// Parameters and least residual sum of squares of [`ols`], the same bits without the evidence of its rank.
+/// [`LinearSolution::x`] (`p` parameters, those of dropped columns zero) and [`LinearSolution::rss`] (effort²) of [`ols`], the same bits
+/// without the evidence of its rank.
 ///
 /// Singular values take most of the time of [`ols`]; here only factors need them that may be rank-deficient.
 pub fn ols_values(factor: &Factor) -> (Vec<f64>, f64) {
