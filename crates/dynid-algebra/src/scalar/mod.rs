@@ -11,7 +11,7 @@ mod lanes;
 mod sine;
 
 pub use cross::Cross;
-pub use curve::{Curve, map_curve, map_decay};
+pub use curve::{Curve, map_curve, map_decay, sin_cos_columns};
 pub use dispatch::{FusedTask, run_fused};
 pub use dispatch::{LANES, LaneTask, run_on_lanes, run_on_wide_lanes};
 pub use dual::Dual;

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Parameter, ShapeParameter};
-use dynid_algebra::scalar::{Jet, Scalar};
+use dynid_algebra::scalar::{Jet, Scalar, sin_cos_columns};
 
 /// An effort that repeats `n` times a turn, two columns `w cos(n q)`, `w sin(n q)` for the coefficients `A` and `B`.
 ///
@@ -54,11 +54,23 @@ impl Cyclic {
         cycles
     }
 
-    /// Both columns at a position and the factor `w`, and their derivatives by the position and by `n`.
-    fn at(q: f64, n: f64, w: f64) -> [[f64; 2]; 3] {
+    /// Both columns at a position and the factor `w`, and their derivatives by the position.
+    fn at(q: f64, n: f64, w: f64) -> [[f64; 2]; 2] {
         let (sine, cosine) = (n * q).sin_cos();
         let (sine, cosine) = (w * sine, w * cosine);
-        [[cosine, sine], [-n * sine, n * cosine], [-q * sine, q * cosine]]
+        [[cosine, sine], [-n * sine, n * cosine]]
+    }
+
+    /// Writes `cos(n q)` and `sin(n q)` of every sample.
+    fn fill_turns(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        n: f64,
+        cosines: &mut [f64],
+        sines: &mut [f64],
+    ) {
+        sin_cos_columns(n, motion.position(joints[self.rate].position), sines, cosines);
     }
 
     /// Position and velocity of every sample.
@@ -104,9 +116,13 @@ impl JointElement for Cyclic {
     ) {
         let n = self.cycles(shape);
         let [first, second] = out.columns(0);
-        for ((q, v), to) in self.signals(joints, motion).zip(first.iter_mut().zip(second)) {
-            let [columns, ..] = Self::at(q, n, self.factor(motion, v));
-            [*to.0, *to.1] = columns;
+        self.fill_turns(joints, motion, n, first, second);
+        if self.is_friction {
+            for (v, to) in motion.rate(self.rate).iter().zip(first.iter_mut().zip(second)) {
+                let w = motion.sign(*v);
+                *to.0 *= w;
+                *to.1 *= w;
+            }
         }
     }
     fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
@@ -131,9 +147,10 @@ impl JointElement for Cyclic {
         }
         let n = self.cycles(shape);
         let [first, second] = out.columns(0);
-        for ((q, v), to) in self.signals(joints, motion).zip(first.iter_mut().zip(second)) {
-            let [.., by_cycles] = Self::at(q, n, self.factor(motion, v));
-            [*to.0, *to.1] = by_cycles;
+        self.fill_turns(joints, motion, n, first, second);
+        for ((q, v), (first, second)) in self.signals(joints, motion).zip(first.iter_mut().zip(second)) {
+            let lever = q * self.factor(motion, v);
+            (*first, *second) = (-lever * *second, lever * *first);
         }
     }
     fn shape_adjoint(
@@ -170,7 +187,7 @@ impl JointElement for Cyclic {
         let (n, position, samples) = (self.cycles(shape), joints[self.rate].position, motion.samples);
         for (s, (q, v)) in self.signals(joints, motion).enumerate() {
             let (a, b) = (weights.column(0)[s], weights.column(1)[s]);
-            let [_, [first, second], _] = Self::at(q, n, self.factor(motion, v));
+            let [_, [first, second]] = Self::at(q, n, self.factor(motion, v));
             out.q[position * samples + s] += a * first + b * second;
             if self.is_friction {
                 let [[cosine, sine], ..] = Self::at(q, n, motion.sign_slope(v));
