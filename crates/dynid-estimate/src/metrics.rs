@@ -95,8 +95,7 @@ impl FitSums {
             let (channel, expected, found) = (self.channels.len(), measured.len(), predicted.len());
             return Err(MetricsError::Samples { channel, expected, found });
         }
-        let pairs = measured.iter().copied().zip(predicted.iter().copied());
-        self.add(&ChannelSums::of(self.channels.len(), pairs)?, counts);
+        self.add(&ChannelSums::of(self.channels.len(), measured, predicted)?, counts);
         Ok(())
     }
 
@@ -163,11 +162,32 @@ pub struct ChannelSums {
 }
 
 impl ChannelSums {
-    /// Sums over samples, measured and predicted. `channel`: number of the channel, for errors.
+    /// Sums over samples, measured and predicted, as many as the shorter of both has. `channel`: number of the channel, for errors.
     ///
     /// # Errors
     /// [`MetricsError::NotFinite`].
-    pub fn of(channel: usize, pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Result<Self, MetricsError> {
+    pub fn of(channel: usize, measured: &[f64], predicted: &[f64]) -> Result<Self, MetricsError> {
+        Self::of_pairs(channel, measured.iter().copied().zip(predicted.iter().copied()))
+    }
+
+    /// [`ChannelSums::of`] over the samples that count; the sample of an error is counted among these.
+    ///
+    /// # Errors
+    /// [`MetricsError::NotFinite`].
+    pub fn of_counted(
+        channel: usize,
+        measured: &[f64],
+        predicted: &[f64],
+        counts: &[bool],
+    ) -> Result<Self, MetricsError> {
+        let pairs = measured.iter().zip(predicted).zip(counts);
+        Self::of_pairs(channel, pairs.filter(|(_, counts)| **counts).map(|((m, p), _)| (*m, *p)))
+    }
+
+    fn of_pairs(
+        channel: usize,
+        pairs: impl Iterator<Item = (f64, f64)> + Clone,
+    ) -> Result<Self, MetricsError> {
         let (mut samples, mut sum, mut error_energy, mut energy) = (0, 0.0, 0.0, 0.0);
         let (mut highest, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut most, mut least, mut predicted_sum) = (f64::NEG_INFINITY, f64::INFINITY, 0.0);

@@ -7,6 +7,7 @@ use dynid_estimate::metrics::{ChannelSums, Fit, FitSums};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward, forward_backward_in_step};
 use dynid_motion::shift::shift;
+use dynid_motion::signal::rms_where;
 use dynid_rows::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -113,9 +114,10 @@ pub fn compare(
     let of_output = |(output, unaligned): (usize, Vec<f64>)| -> Result<(Vec<f64>, [ChannelSums; 5]), Error> {
         let measured = &log.effort[output];
         let agree = |measured: &[f64], predicted: &[f64], part: Part| {
-            let is_of = |k: &usize| counted[*k] && part.holds(motion.samples[output][*k]);
-            let pairs = (0..measured.len()).filter(is_of).map(|k| (measured[k], predicted[k]));
-            ChannelSums::of(output, pairs).map_err(|e| too_short(e.to_string()))
+            let is_of = |(counts, moves): (&bool, &bool)| *counts && part.holds(*moves);
+            let counts: Vec<bool> = counted.iter().zip(&motion.samples[output]).map(is_of).collect();
+            ChannelSums::of_counted(output, measured, predicted, &counts)
+                .map_err(|e| too_short(e.to_string()))
         };
         let filtered = |predicted: &[f64]| {
             forward_backward_in_step(&filter, [measured, predicted]).map_err(conditioning)
@@ -285,20 +287,12 @@ impl Agreement {
     /// [`Error::Conditioning`], [`Error::TooShort`].
     pub fn without(&self, lost: impl IndexedParallelIterator<Item = Vec<f64>>) -> Result<FileFit, Error> {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
-        let counts = |k: &usize| self.counted[*k];
-        let rms = |signal: &[f64]| {
-            let (mut square, mut samples) = (0.0, 0usize);
-            for k in (0..signal.len()).filter(counts) {
-                square += signal[k] * signal[k];
-                samples += 1;
-            }
-            (square / samples as f64).sqrt()
-        };
+        let rms = |signal: &[f64]| rms_where(signal, &self.counted);
         let of_output = |(output, lost): (usize, Vec<f64>)| {
             let signals = [self.measured[output].as_slice(), &lost, &self.predicted[output]];
             let [measured, lost, whole] = forward_backward_in_step(&filter, signals).map_err(conditioning)?;
-            let pairs = (0..measured.len()).filter(counts).map(|k| (measured[k], whole[k] - lost[k]));
-            let sums = ChannelSums::of(output, pairs)
+            let kept: Vec<f64> = whole.iter().zip(&lost).map(|(whole, lost)| whole - lost).collect();
+            let sums = ChannelSums::of_counted(output, &measured, &kept, &self.counted)
                 .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
             Ok((sums, rms(&lost), rms(&measured)))
         };

@@ -27,7 +27,11 @@ impl Cholesky {
 
     /// `A⁻¹ B`.
     pub fn solve(&self, b: &impl AsView) -> Mat {
-        Mat(self.0.solve(b.view().0))
+        self.solve_view(b.view())
+    }
+
+    fn solve_view(&self, b: View<'_>) -> Mat {
+        Mat(self.0.solve(b.0))
     }
 
     /// `A⁻¹ b`.

@@ -10,7 +10,8 @@
 //! | sums over vectors | [`vector`] |
 //!
 //! Everything runs on the thread that calls it, so that sums have one order and results the same bits for any number of threads.
-//! The room is the only one that names the library behind it (`faer`); signatures above it hold [`Mat`].
+//! The room is the only one that names the library behind it (`faer`); signatures above it hold [`Mat`]. Generic doors hand a [`View`] to
+//! a function without parameters, so that the library is compiled here alone, at this room's level.
 
 mod cholesky;
 mod eigen;

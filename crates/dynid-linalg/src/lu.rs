@@ -1,6 +1,6 @@
 //! Square matrices.
 
-use crate::{AsView, Mat};
+use crate::{AsView, Mat, View};
 use faer::linalg::solvers::{DenseSolveCore, FullPivLu, PartialPivLu, Solve};
 
 /// `A = L U` of a square matrix, with exchanges. A singular matrix gives solutions that are not finite.
@@ -36,10 +36,13 @@ impl Lu {
 
     /// `A⁻¹ B`.
     pub fn solve(&self, b: &impl AsView) -> Mat {
-        let b = b.view().0;
+        self.solve_view(b.view())
+    }
+
+    fn solve_view(&self, b: View<'_>) -> Mat {
         Mat(match &self.0 {
-            Kind::Rows(lu) => lu.solve(b),
-            Kind::Full(lu) => lu.solve(b),
+            Kind::Rows(lu) => lu.solve(b.0),
+            Kind::Full(lu) => lu.solve(b.0),
         })
     }
 

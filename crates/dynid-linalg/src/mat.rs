@@ -22,8 +22,12 @@ impl AsView for Mat {
 impl Mat {
     /// A matrix from its entries.
     #[inline]
-    pub fn from_fn(rows: usize, columns: usize, entry: impl FnMut(usize, usize) -> f64) -> Mat {
-        Mat(faer::Mat::from_fn(rows, columns, entry))
+    pub fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Mat {
+        let mut out = Mat::zeros(rows, columns);
+        for column in 0..columns {
+            out.col_mut(column).iter_mut().enumerate().for_each(|(row, to)| *to = entry(row, column));
+        }
+        out
     }
 
     /// A matrix of zeros.
@@ -103,8 +107,11 @@ impl Mat {
 
     /// Writes a matrix over the rows from `first` on; as wide as this one.
     pub fn set_rows(&mut self, first: usize, from: &impl AsView) {
-        let from = from.view().0;
-        self.0.subrows_mut(first, from.nrows()).copy_from(from);
+        self.set_rows_view(first, from.view());
+    }
+
+    fn set_rows_view(&mut self, first: usize, from: View<'_>) {
+        self.0.subrows_mut(first, from.nrows()).copy_from(from.0);
     }
 
     /// `A v`.

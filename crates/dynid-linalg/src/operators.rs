@@ -11,7 +11,7 @@ macro_rules! operators {
             type Output = Mat;
 
             fn mul(self, other: R) -> Mat {
-                Mat(self.view().0 * other.view().0)
+                product(self.view(), other.view())
             }
         }
 
@@ -27,7 +27,7 @@ macro_rules! operators {
             type Output = Mat;
 
             fn add(self, other: R) -> Mat {
-                Mat(self.view().0 + other.view().0)
+                sum(self.view(), other.view())
             }
         }
 
@@ -35,7 +35,7 @@ macro_rules! operators {
             type Output = Mat;
 
             fn sub(self, other: R) -> Mat {
-                Mat(self.view().0 - other.view().0)
+                difference(self.view(), other.view())
             }
         }
     )*};
@@ -43,15 +43,35 @@ macro_rules! operators {
 
 operators!(Mat, &Mat, View<'_>);
 
+fn product(a: View<'_>, b: View<'_>) -> Mat {
+    Mat(a.0 * b.0)
+}
+
+fn sum(a: View<'_>, b: View<'_>) -> Mat {
+    Mat(a.0 + b.0)
+}
+
+fn difference(a: View<'_>, b: View<'_>) -> Mat {
+    Mat(a.0 - b.0)
+}
+
+fn add(to: &mut Mat, other: View<'_>) {
+    to.0 += other.0;
+}
+
+fn subtract(from: &mut Mat, other: View<'_>) {
+    from.0 -= other.0;
+}
+
 impl<R: AsView> AddAssign<R> for Mat {
     fn add_assign(&mut self, other: R) {
-        self.0 += other.view().0;
+        add(self, other.view());
     }
 }
 
 impl<R: AsView> SubAssign<R> for Mat {
     fn sub_assign(&mut self, other: R) {
-        self.0 -= other.view().0;
+        subtract(self, other.view());
     }
 }
 

@@ -42,7 +42,11 @@ impl Qr {
 
     /// `argmin ‖A X - B‖` of a matrix at least as tall as wide, of full rank.
     pub fn solve_least_squares(&self, b: &impl AsView) -> Mat {
-        Mat(self.0.solve_lstsq(b.view().0))
+        self.solve_view(b.view())
+    }
+
+    fn solve_view(&self, b: View<'_>) -> Mat {
+        Mat(self.0.solve_lstsq(b.0))
     }
 }
 
@@ -53,7 +57,11 @@ pub struct PivotedQr(ColPivQr<f64>);
 impl PivotedQr {
     /// Of a matrix or a part of one.
     pub fn new(a: &impl AsView) -> Self {
-        PivotedQr(a.view().0.col_piv_qr())
+        PivotedQr::of(a.view())
+    }
+
+    fn of(a: View<'_>) -> Self {
+        PivotedQr(a.0.col_piv_qr())
     }
 
     /// `R`, as tall as `A`.
@@ -68,7 +76,11 @@ impl PivotedQr {
 
     /// `A⁻¹ B` of a square matrix.
     pub fn solve(&self, b: &impl AsView) -> Mat {
-        Mat(self.0.solve(b.view().0))
+        self.solve_view(b.view())
+    }
+
+    fn solve_view(&self, b: View<'_>) -> Mat {
+        Mat(self.0.solve(b.0))
     }
 }
 

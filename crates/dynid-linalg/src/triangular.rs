@@ -1,6 +1,6 @@
 //! Substitution with small triangles, and their inverses.
 
-use crate::{AsView, Mat};
+use crate::{AsView, Mat, View};
 use faer::Par;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 
@@ -11,7 +11,11 @@ pub fn solve_upper_in_place(r: &Mat, b: &mut Mat) {
 
 /// `L⁻¹ B` written over `B`. The diagonal of `l` must not hold zeros.
 pub fn solve_lower_in_place(l: &impl AsView, b: &mut Mat) {
-    solve_lower_triangular_in_place(l.view().0, b.0.as_mut(), Par::Seq);
+    solve_lower_view(l.view(), b);
+}
+
+fn solve_lower_view(l: View<'_>, b: &mut Mat) {
+    solve_lower_triangular_in_place(l.0, b.0.as_mut(), Par::Seq);
 }
 
 /// `R⁻¹ B`. The diagonal of `r` must not hold zeros.

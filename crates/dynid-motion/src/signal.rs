@@ -98,6 +98,16 @@ pub fn rms(signal: &[f64]) -> f64 {
     (signal.iter().map(|x| x * x).sum::<f64>() / signal.len() as f64).sqrt()
 }
 
+/// Root mean square over the samples that count; not a number if none does.
+pub fn rms_where(signal: &[f64], counts: &[bool]) -> f64 {
+    let (mut square, mut samples) = (0.0, 0_usize);
+    for (x, _) in signal.iter().zip(counts).filter(|(_, counts)| **counts) {
+        square += x * x;
+        samples += 1;
+    }
+    (square / samples as f64).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

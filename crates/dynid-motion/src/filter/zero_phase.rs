@@ -28,8 +28,9 @@ pub fn forward_backward_in_step<const N: usize>(
     filter: &Sections,
     signals: [&[f64]; N],
 ) -> Result<[Vec<f64>; N], SignalError> {
-    signals.iter().try_for_each(|signal| check_signal(signal, filter.padding() + 1))?;
-    Ok(in_step(filter, signals))
+    // The filter itself is compiled here alone, not with whoever asks for so many signals.
+    let mut filtered = forward_backward_all(filter, &signals)?.into_iter();
+    Ok(signals.map(|_| filtered.next().unwrap_or_default()))
 }
 
 /// [`forward_backward_in_step`] of any number of signals.

@@ -1,6 +1,6 @@
 //! Laws of velocity at a joint, with a name for each of their shape parameters.
 
-use crate::element::law::{AtJoint, Placed};
+use crate::element::law::{AtJoint, stands_for_a_law};
 use crate::element::{ShapeSetting, laws};
 
 /// A struct that places a law with named settings of its shape parameters.
@@ -13,12 +13,13 @@ macro_rules! placed {
             pub rate: usize,
         }
 
-        impl Placed for $name {
-            type Element = AtJoint<$kind, 0, $columns>;
-            fn element(&self) -> Self::Element {
+        impl $name {
+            fn at_joint(&self) -> AtJoint<$kind, 0, $columns> {
                 AtJoint { rate: self.rate, law: $law, shape: [] }
             }
         }
+
+        stands_for_a_law!($name);
     };
     ($(#[$doc:meta])* $name:ident, $law:expr, $kind:ty, $columns:literal, $shapes:literal {
         $($(#[$field_doc:meta])* $field:ident),+
@@ -42,14 +43,13 @@ macro_rules! placed {
                 let [$($field),+] = AtJoint::<$kind, $shapes, $columns>::new(rate, $law, v_max).shape;
                 $name { rate, $($field),+ }
             }
-        }
 
-        impl Placed for $name {
-            type Element = AtJoint<$kind, $shapes, $columns>;
-            fn element(&self) -> Self::Element {
+            fn at_joint(&self) -> AtJoint<$kind, $shapes, $columns> {
                 AtJoint { rate: self.rate, law: $law, shape: [$(self.$field),+] }
             }
         }
+
+        stands_for_a_law!($name);
     };
 }
 
@@ -171,9 +171,8 @@ impl ExponentialViscous {
     }
 }
 
-impl Placed for ExponentialViscous {
-    type Element = AtJoint<laws::ExponentialViscous, 4, 2>;
-    fn element(&self) -> Self::Element {
+impl ExponentialViscous {
+    fn at_joint(&self) -> AtJoint<laws::ExponentialViscous, 4, 2> {
         let law = laws::ExponentialViscous {
             reference_temperature: self.reference_temperature,
             temperature_range: self.temperature_range,
@@ -183,3 +182,5 @@ impl Placed for ExponentialViscous {
         AtJoint { rate: self.rate, law, shape }
     }
 }
+
+stands_for_a_law!(ExponentialViscous);

@@ -1,10 +1,11 @@
 //! Laws of velocity: one function gives an element's columns, their derivatives, adjoints and time derivatives.
 
 mod at_joint;
+mod named;
 mod terms;
 
 pub use at_joint::AtJoint;
-pub(super) use at_joint::Placed;
+pub(super) use named::stands_for_a_law;
 pub use terms::{LinearTerm, ShapeScale, ShapeTerm, units};
 
 use std::fmt::Debug;
