@@ -10,8 +10,15 @@ use faer::{Accum, ColRef, MatMut, MatRef, Par};
 ///
 /// Products, sums and multiples are operators: `&a * &b`, `a.transpose() * &b`, `&a * 2.0`. Indices and sizes that do not agree
 /// panic.
-#[derive(Clone, PartialEq)]
+#[derive(PartialEq)]
 pub struct Mat(pub(crate) faer::Mat<f64>);
+
+// Not derived: a derived one is compiled with everyone who clones.
+impl Clone for Mat {
+    fn clone(&self) -> Mat {
+        Mat(self.0.clone())
+    }
+}
 
 impl AsView for Mat {
     fn view(&self) -> View<'_> {
