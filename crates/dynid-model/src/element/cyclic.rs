@@ -153,6 +153,24 @@ impl JointElement for Cyclic {
             (*first, *second) = (-lever * *second, lever * *first);
         }
     }
+    fn fill_with_derivatives(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        values: &mut ElementColumns<'_>,
+        derivatives: &mut ElementColumns<'_>,
+    ) {
+        self.fill(joints, motion, shape, values);
+        if self.cycles.held {
+            return;
+        }
+        let (q, [cosines, sines]) = (motion.position(joints[self.rate].position), values.columns(0));
+        let [first, second] = derivatives.columns(0);
+        for (s, q) in q.iter().enumerate() {
+            (first[s], second[s]) = (-q * sines[s], q * cosines[s]);
+        }
+    }
     fn shape_adjoint(
         &self,
         joints: &[JointInfo],

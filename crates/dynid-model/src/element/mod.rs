@@ -284,6 +284,18 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         _out: &mut ElementColumns<'_>,
     ) {
     }
+    /// Both of [`JointElement::fill`] and [`JointElement::shape_derivatives`], for elements that get one with the other.
+    fn fill_with_derivatives(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        values: &mut ElementColumns<'_>,
+        derivatives: &mut ElementColumns<'_>,
+    ) {
+        self.fill(joints, motion, shape, values);
+        self.shape_derivatives(joints, motion, shape, derivatives);
+    }
     /// Adds to `out` the derivatives of `Σ weights ∘ shape derivatives` with respect to the motion, one column of weights
     /// per pair of [`JointElement::shape_entries`]; kinks as in [`JointElement::adjoint`].
     fn shape_adjoint(

@@ -73,24 +73,30 @@ impl TreeModel {
         let samples = motion.samples;
         for shaped in &self.shaped.elements {
             let placed = &self.elements[shaped.element];
-            let own_shape = placed.shape(shape);
-            if !derivatives.is_empty() {
-                let mut out =
-                    ElementColumns { data: derivatives, slots: &shaped.derivatives, stride, samples };
-                placed.element.shape_derivatives(&self.joints, motion, own_shape, &mut out);
-            }
-            if values.is_empty() {
+            let (element, own_shape) = (&placed.element, placed.shape(shape));
+            let mut slopes =
+                ElementColumns { data: &mut *derivatives, slots: &shaped.derivatives, stride, samples };
+            let wanted = (!values.is_empty(), !slopes.data.is_empty());
+            if let (true, Some(slots)) = (wanted.0, &shaped.in_place) {
+                let mut out = ElementColumns { data: &mut *values, slots, stride, samples };
+                match wanted.1 {
+                    true => {
+                        element.fill_with_derivatives(&self.joints, motion, own_shape, &mut out, &mut slopes);
+                    }
+                    false => element.fill(&self.joints, motion, own_shape, &mut out),
+                }
                 continue;
             }
-            if let Some(slots) = &shaped.in_place {
-                let mut out = ElementColumns { data: values, slots, stride, samples };
-                placed.element.fill(&self.joints, motion, own_shape, &mut out);
+            if wanted.1 {
+                element.shape_derivatives(&self.joints, motion, own_shape, &mut slopes);
+            }
+            if !wanted.0 {
                 continue;
             }
             let mut own = vec![0.0; placed.entries.len() * samples];
             let mut out =
                 ElementColumns { data: &mut own, slots: &placed.entry_numbers, stride: samples, samples };
-            placed.element.fill(&self.joints, motion, own_shape, &mut out);
+            element.fill(&self.joints, motion, own_shape, &mut out);
             for (to, from) in shaped.columns.iter().zip(own.chunks_exact(samples.max(1))) {
                 if let Some(to) = to {
                     values[to * stride..][..samples].copy_from_slice(from);

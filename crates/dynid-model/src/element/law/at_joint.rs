@@ -38,6 +38,22 @@ impl<L: VelocityLaw<N, M>, const N: usize, const M: usize> AtJoint<L, N, M> {
         reads.then(|| temperature_channel(&joints[self.rate].name))
     }
 
+    /// Runs the pass of derivatives by a shape parameter.
+    fn run_by_shape(
+        &self,
+        parameter: usize,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: [f64; N],
+        out: impl Sink<M>,
+    ) {
+        match parameter {
+            0 => self.run(ByShape(Known::<0>), joints, motion, shape, out),
+            1 => self.run(ByShape(Known::<1>), joints, motion, shape, out),
+            _ => self.run(ByShape(parameter), joints, motion, shape, out),
+        }
+    }
+
     /// Runs a pass over all samples of a block.
     fn run<P: Pass>(
         &self,
@@ -88,6 +104,7 @@ trait Pass: Copy {
     type Number: Scalar;
     fn velocity(self, v: f64) -> Self::Number;
     fn shape(self, parameter: usize, value: f64) -> Self::Number;
+    fn value(self, column: Self::Number) -> f64;
     fn read(self, column: Self::Number) -> f64;
 }
 
@@ -137,6 +154,10 @@ impl Pass for Values {
         value
     }
     #[inline(always)]
+    fn value(self, column: f64) -> f64 {
+        column
+    }
+    #[inline(always)]
     fn read(self, column: f64) -> f64 {
         column
     }
@@ -151,6 +172,10 @@ impl<W: Which> Pass for ByShape<W> {
     #[inline(always)]
     fn shape(self, parameter: usize, value: f64) -> Dual<1> {
         Dual { value, derivative: [if parameter == self.0.number() { 1.0 } else { 0.0 }] }
+    }
+    #[inline(always)]
+    fn value(self, column: Dual<1>) -> f64 {
+        column.value
     }
     #[inline(always)]
     fn read(self, column: Dual<1>) -> f64 {
@@ -169,6 +194,10 @@ impl Pass for ByVelocity {
         Dual { value, derivative: [0.0] }
     }
     #[inline(always)]
+    fn value(self, column: Dual<1>) -> f64 {
+        column.value
+    }
+    #[inline(always)]
     fn read(self, column: Dual<1>) -> f64 {
         column.derivative[0]
     }
@@ -185,6 +214,10 @@ impl Pass for ByBoth {
         Cross { value, a: 0.0, b: if parameter == self.0 { 1.0 } else { 0.0 }, ab: 0.0 }
     }
     #[inline(always)]
+    fn value(self, column: Cross) -> f64 {
+        column.value
+    }
+    #[inline(always)]
     fn read(self, column: Cross) -> f64 {
         column.ab
     }
@@ -192,7 +225,7 @@ impl Pass for ByBoth {
 
 /// Where the columns of a sample go.
 trait Sink<const M: usize> {
-    fn put(&mut self, sample: usize, columns: [f64; M]);
+    fn put<P: Pass>(&mut self, sample: usize, pass: P, columns: [P::Number; M]);
 }
 
 /// Columns to be filled.
@@ -200,9 +233,25 @@ struct Fill<'a, const M: usize>([&'a mut [f64]; M]);
 
 impl<const M: usize> Sink<M> for Fill<'_, M> {
     #[inline(always)]
-    fn put(&mut self, sample: usize, columns: [f64; M]) {
-        for (to, value) in self.0.iter_mut().zip(columns) {
-            to[sample] = value;
+    fn put<P: Pass>(&mut self, sample: usize, pass: P, columns: [P::Number; M]) {
+        for (to, column) in self.0.iter_mut().zip(columns) {
+            to[sample] = pass.read(column);
+        }
+    }
+}
+
+/// Columns of values and what a pass reads off them, both to be filled.
+struct FillBoth<'a, const M: usize> {
+    values: [&'a mut [f64]; M],
+    read: [&'a mut [f64]; M],
+}
+
+impl<const M: usize> Sink<M> for FillBoth<'_, M> {
+    #[inline(always)]
+    fn put<P: Pass>(&mut self, sample: usize, pass: P, columns: [P::Number; M]) {
+        for (k, column) in columns.into_iter().enumerate() {
+            self.values[k][sample] = pass.value(column);
+            self.read[k][sample] = pass.read(column);
         }
     }
 }
@@ -215,10 +264,10 @@ struct Add<'a, const M: usize> {
 
 impl<const M: usize> Sink<M> for Add<'_, M> {
     #[inline(always)]
-    fn put(&mut self, sample: usize, columns: [f64; M]) {
+    fn put<P: Pass>(&mut self, sample: usize, pass: P, columns: [P::Number; M]) {
         let mut sum = self.to[sample];
-        for (weight, value) in self.weights.iter().zip(columns) {
-            sum += weight[sample] * value;
+        for (weight, column) in self.weights.iter().zip(columns) {
+            sum += weight[sample] * pass.read(column);
         }
         self.to[sample] = sum;
     }
@@ -257,7 +306,7 @@ where
             let temperature = P::Number::from_f64(temperature(sample));
             let velocity = Velocity { value: pass.velocity(*v), sign_width, temperature };
             let columns = law.columns(velocity, shape);
-            out.put(sample, columns.map(|column| pass.read(column)));
+            out.put(sample, pass, columns);
         }
     }
 }
@@ -325,13 +374,26 @@ impl<L: VelocityLaw<N, M>, const N: usize, const M: usize> JointElement for AtJo
         let values = values(self.settings(), shape);
         for (parameter, place) in places(self.settings()).into_iter().enumerate() {
             let Some(place) = place else { continue };
-            let out = Fill(out.columns(M * place));
-            match parameter {
-                0 => self.run(ByShape(Known::<0>), joints, motion, values, out),
-                1 => self.run(ByShape(Known::<1>), joints, motion, values, out),
-                _ => self.run(ByShape(parameter), joints, motion, values, out),
-            }
+            self.run_by_shape(parameter, joints, motion, values, Fill(out.columns(M * place)));
         }
+    }
+    fn fill_with_derivatives(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        columns: &mut ElementColumns<'_>,
+        derivatives: &mut ElementColumns<'_>,
+    ) {
+        // What a derivative is formed from holds the values too. Most laws have one shape parameter that is free.
+        let free: Vec<usize> = (0..N).filter(|k| places(self.settings())[*k].is_some()).collect();
+        let [parameter] = free[..] else {
+            self.fill(joints, motion, shape, columns);
+            self.shape_derivatives(joints, motion, shape, derivatives);
+            return;
+        };
+        let out = FillBoth { values: columns.columns(0), read: derivatives.columns(0) };
+        self.run_by_shape(parameter, joints, motion, values(self.settings(), shape), out);
     }
     fn shape_adjoint(
         &self,

@@ -53,6 +53,16 @@ macro_rules! stands_for_a_law {
             ) {
                 self.at_joint().shape_derivatives(joints, motion, shape, out);
             }
+            fn fill_with_derivatives(
+                &self,
+                joints: &[$crate::element::JointInfo],
+                motion: &$crate::MotionBlock<'_>,
+                shape: &[f64],
+                values: &mut $crate::element::ElementColumns<'_>,
+                derivatives: &mut $crate::element::ElementColumns<'_>,
+            ) {
+                self.at_joint().fill_with_derivatives(joints, motion, shape, values, derivatives);
+            }
             fn shape_adjoint(
                 &self,
                 joints: &[$crate::element::JointInfo],
