@@ -1,7 +1,17 @@
 //! Smoothing and differentiation by polynomials over a window.
 
 use crate::signal::{SignalError, check_positive, check_signal};
-use crate::textbook::States;
+
+/// Position, velocity and acceleration on one grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct States {
+    /// rad or m.
+    pub position: Vec<f64>,
+    /// Per s.
+    pub velocity: Vec<f64>,
+    /// Per s^2.
+    pub acceleration: Vec<f64>,
+}
 
 /// Savitzky-Golay filter: every sample becomes the value, or a derivative, of the polynomial of degree `order` that fits the `window`
 /// samples about it best in the sense of least squares.
