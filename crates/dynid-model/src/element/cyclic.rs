@@ -61,16 +61,15 @@ impl Cyclic {
         [[cosine, sine], [-n * sine, n * cosine]]
     }
 
-    /// Writes `cos(n q)` and `sin(n q)` of every sample.
-    fn fill_turns(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-        n: f64,
-        cosines: &mut [f64],
-        sines: &mut [f64],
-    ) {
-        sin_cos_columns(n, motion.position(joints[self.rate].position), sines, cosines);
+    /// Writes the derivatives of the columns by `n`, `-q w sin(n q)` and `q w cos(n q)`.
+    fn by_cycles(q: &[f64], [cosines, sines]: [&[f64]; 2], [first, second]: [&mut [f64]; 2]) {
+        for (s, q) in q.iter().enumerate() {
+            (first[s], second[s]) = (-q * sines[s], q * cosines[s]);
+        }
+    }
+
+    fn positions<'a>(&self, joints: &[JointInfo], motion: &MotionBlock<'a>) -> &'a [f64] {
+        motion.position(joints[self.rate].position)
     }
 
     /// Position and velocity of every sample.
@@ -79,7 +78,7 @@ impl Cyclic {
         joints: &[JointInfo],
         motion: &MotionBlock<'a>,
     ) -> impl Iterator<Item = (f64, f64)> + use<'a> {
-        let (q, v) = (motion.position(joints[self.rate].position), motion.rate(self.rate));
+        let (q, v) = (self.positions(joints, motion), motion.rate(self.rate));
         q.iter().copied().zip(v.iter().copied())
     }
 
@@ -114,14 +113,13 @@ impl JointElement for Cyclic {
         shape: &[f64],
         out: &mut ElementColumns<'_>,
     ) {
-        let n = self.cycles(shape);
-        let [first, second] = out.columns(0);
-        self.fill_turns(joints, motion, n, first, second);
+        let [cosines, sines] = out.columns(0);
+        sin_cos_columns(self.cycles(shape), self.positions(joints, motion), sines, cosines);
         if self.is_friction {
-            for (v, to) in motion.rate(self.rate).iter().zip(first.iter_mut().zip(second)) {
+            for (v, (cosine, sine)) in motion.rate(self.rate).iter().zip(cosines.iter_mut().zip(sines)) {
                 let w = motion.sign(*v);
-                *to.0 *= w;
-                *to.1 *= w;
+                *cosine *= w;
+                *sine *= w;
             }
         }
     }
@@ -145,13 +143,10 @@ impl JointElement for Cyclic {
         if self.cycles.held {
             return;
         }
-        let n = self.cycles(shape);
+        self.fill(joints, motion, shape, out);
         let [first, second] = out.columns(0);
-        self.fill_turns(joints, motion, n, first, second);
-        for ((q, v), (first, second)) in self.signals(joints, motion).zip(first.iter_mut().zip(second)) {
-            let lever = q * self.factor(motion, v);
-            (*first, *second) = (-lever * *second, lever * *first);
-        }
+        let (cosines, sines) = (first.to_vec(), second.to_vec());
+        Self::by_cycles(self.positions(joints, motion), [&cosines, &sines], [first, second]);
     }
     fn fill_with_derivatives(
         &self,
@@ -165,11 +160,8 @@ impl JointElement for Cyclic {
         if self.cycles.held {
             return;
         }
-        let (q, [cosines, sines]) = (motion.position(joints[self.rate].position), values.columns(0));
-        let [first, second] = derivatives.columns(0);
-        for (s, q) in q.iter().enumerate() {
-            (first[s], second[s]) = (-q * sines[s], q * cosines[s]);
-        }
+        let columns = values.columns(0).map(|column| &*column);
+        Self::by_cycles(self.positions(joints, motion), columns, derivatives.columns(0));
     }
     fn shape_adjoint(
         &self,

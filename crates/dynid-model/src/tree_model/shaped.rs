@@ -71,26 +71,25 @@ impl TreeModel {
     ) {
         self.check_shapes(shape, None);
         let samples = motion.samples;
+        let (wants_values, wants_derivatives) = (!values.is_empty(), !derivatives.is_empty());
         for shaped in &self.shaped.elements {
             let placed = &self.elements[shaped.element];
             let (element, own_shape) = (&placed.element, placed.shape(shape));
             let mut slopes =
                 ElementColumns { data: &mut *derivatives, slots: &shaped.derivatives, stride, samples };
-            let wanted = (!values.is_empty(), !slopes.data.is_empty());
-            if let (true, Some(slots)) = (wanted.0, &shaped.in_place) {
+            if let (true, Some(slots)) = (wants_values, &shaped.in_place) {
                 let mut out = ElementColumns { data: &mut *values, slots, stride, samples };
-                match wanted.1 {
-                    true => {
-                        element.fill_with_derivatives(&self.joints, motion, own_shape, &mut out, &mut slopes);
-                    }
-                    false => element.fill(&self.joints, motion, own_shape, &mut out),
+                if wants_derivatives {
+                    element.fill_with_derivatives(&self.joints, motion, own_shape, &mut out, &mut slopes);
+                } else {
+                    element.fill(&self.joints, motion, own_shape, &mut out);
                 }
                 continue;
             }
-            if wanted.1 {
+            if wants_derivatives {
                 element.shape_derivatives(&self.joints, motion, own_shape, &mut slopes);
             }
-            if !wanted.0 {
+            if !wants_values {
                 continue;
             }
             let mut own = vec![0.0; placed.entries.len() * samples];

@@ -195,6 +195,13 @@ fn shaped_columns_are_those_of_the_regressor() {
             let at = model.layout().columns(*output).iter().position(|c| c == column).unwrap();
             assert_eq!(whole.column(*output, at), &values[k * stride..][..n], "{output} {column}");
         }
+        // Together as one by one.
+        let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
+        let mut alone = vec![f64::NAN; model.shape_dependence().len() * stride];
+        let (mut both, mut slopes) = (vec![f64::NAN; values.len()], alone.clone());
+        model.shaped(&block, &shape, stride, &mut [], &mut alone);
+        model.shaped(&block, &shape, stride, &mut both, &mut slopes);
+        assert_eq!((bits(&both), bits(&slopes)), (bits(&values), bits(&alone)));
     }
     assert!(model.shaped_columns().is_sorted());
     let held = model.parameters().column("j4.fa").unwrap();

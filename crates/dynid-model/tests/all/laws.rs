@@ -51,6 +51,11 @@ fn columns(model: &RobotModel, v: &[f64], width: f64, shape: &[f64]) -> (Vec<Vec
     let values = (10..entries).map(|k| block.column(0, k).to_vec()).collect();
     let mut derivatives = vec![0.0; n * model.shape_dependence().len()];
     model.shaped(&motion, shape, n, &mut [], &mut derivatives);
+    let mut shaped = vec![0.0; n * model.shaped_columns().len()];
+    let mut together = (shaped.clone(), vec![0.0; derivatives.len()]);
+    model.shaped(&motion, shape, n, &mut shaped, &mut []);
+    model.shaped(&motion, shape, n, &mut together.0, &mut together.1);
+    assert_eq!(together, (shaped, derivatives.clone()), "asked for together as one by one");
     (values, derivatives.chunks_exact(n).map(<[f64]>::to_vec).collect())
 }
 
