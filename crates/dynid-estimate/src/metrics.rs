@@ -91,10 +91,6 @@ impl FitSums {
     /// # Errors
     /// [`MetricsError::Samples`], [`MetricsError::NotFinite`].
     pub fn push(&mut self, measured: &[f64], predicted: &[f64], counts: bool) -> Result<(), MetricsError> {
-        if measured.len() != predicted.len() {
-            let (channel, expected, found) = (self.channels.len(), measured.len(), predicted.len());
-            return Err(MetricsError::Samples { channel, expected, found });
-        }
         self.add(&ChannelSums::of(self.channels.len(), measured, predicted)?, counts);
         Ok(())
     }
@@ -140,6 +136,13 @@ impl FitSums {
     }
 }
 
+fn same_length(channel: usize, expected: usize, found: usize) -> Result<(), MetricsError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(MetricsError::Samples { channel, expected, found }),
+    }
+}
+
 /// What the agreement of a channel is formed from.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ChannelSums {
@@ -162,24 +165,30 @@ pub struct ChannelSums {
 }
 
 impl ChannelSums {
-    /// Sums over samples, measured and predicted, as many as the shorter of both has. `channel`: number of the channel, for errors.
+    /// Sums over samples, measured and predicted. `channel`: number of the channel, for errors.
     ///
     /// # Errors
-    /// [`MetricsError::NotFinite`].
+    /// [`MetricsError::Samples`], [`MetricsError::NotFinite`].
     pub fn of(channel: usize, measured: &[f64], predicted: &[f64]) -> Result<Self, MetricsError> {
+        same_length(channel, measured.len(), predicted.len())?;
         Self::of_pairs(channel, measured.iter().copied().zip(predicted.iter().copied()))
     }
 
-    /// [`ChannelSums::of`] over the samples that count; the sample of an error is counted among these.
+    /// [`ChannelSums::of`] over the samples that count, one flag per sample; the sample of an error is counted among these.
     ///
     /// # Errors
-    /// [`MetricsError::NotFinite`].
+    /// [`MetricsError::Samples`], [`MetricsError::NotFinite`].
+    ///
+    /// # Panics
+    /// If there is not one flag per sample.
     pub fn of_counted(
         channel: usize,
         measured: &[f64],
         predicted: &[f64],
         counts: &[bool],
     ) -> Result<Self, MetricsError> {
+        same_length(channel, measured.len(), predicted.len())?;
+        assert_eq!(measured.len(), counts.len(), "flags of samples");
         let pairs = measured.iter().zip(predicted).zip(counts);
         Self::of_pairs(channel, pairs.filter(|(_, counts)| **counts).map(|((m, p), _)| (*m, *p)))
     }
@@ -325,6 +334,17 @@ mod tests {
         assert_eq!((zero.channels[0].rms, zero.relative_error), (Some(1.0), None));
         let empty = fit(&[[]], &[[]]).unwrap().channels[0];
         assert_eq!((empty.rms, empty.nrmse, empty.r2, empty.relative_error), (None, None, None, None));
+    }
+
+    #[test]
+    fn samples_that_do_not_count_are_left_out() {
+        let (measured, predicted) = ([1.0, 7.0, 3.0, f64::NAN], [1.5, -7.0, 2.0, 0.0]);
+        let counts = [true, false, true, false];
+        let counted = ChannelSums::of_counted(2, &measured, &predicted, &counts).unwrap();
+        assert_eq!(counted, ChannelSums::of(2, &[1.0, 3.0], &[1.5, 2.0]).unwrap());
+        assert_eq!((counted.samples, counted.error_energy, counted.energy), (2, 1.25, 10.0));
+        let short = ChannelSums::of_counted(2, &measured, &predicted[..3], &counts);
+        assert_eq!(short, Err(MetricsError::Samples { channel: 2, expected: 4, found: 3 }));
     }
 
     #[test]

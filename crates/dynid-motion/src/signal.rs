@@ -98,14 +98,18 @@ pub fn rms(signal: &[f64]) -> f64 {
     (signal.iter().map(|x| x * x).sum::<f64>() / signal.len() as f64).sqrt()
 }
 
-/// Root mean square over the samples that count; not a number if none does.
+/// Root mean square over the samples that count, one flag per sample; 0 if none does.
+///
+/// # Panics
+/// If there is not one flag per sample.
 pub fn rms_where(signal: &[f64], counts: &[bool]) -> f64 {
+    assert_eq!(signal.len(), counts.len(), "flags of samples");
     let (mut square, mut samples) = (0.0, 0_usize);
     for (x, _) in signal.iter().zip(counts).filter(|(_, counts)| **counts) {
         square += x * x;
         samples += 1;
     }
-    (square / samples as f64).sqrt()
+    (square / samples.max(1) as f64).sqrt()
 }
 
 #[cfg(test)]
@@ -125,6 +129,14 @@ mod tests {
             assert!(check_cutoff(bad, 100.0).is_err(), "{bad}");
         }
         assert!(check_cutoff(1.0, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn samples_that_do_not_count_are_left_out_of_a_mean() {
+        let signal = [3.0, 100.0, 4.0, f64::NAN];
+        assert_eq!(rms_where(&signal, &[true, false, true, false]), 12.5_f64.sqrt());
+        assert_eq!(rms_where(&signal, &[false; 4]), 0.0);
+        assert_eq!((rms(&[3.0, 4.0]), rms(&[])), (12.5_f64.sqrt(), 0.0));
     }
 
     #[test]
