@@ -239,13 +239,13 @@ pub fn variances_at(
 }
 
 /// What a fit found before it is told.
-struct Found {
-    noise: Noise,
-    splits: Splits,
-    variances: Variances,
-    robust: Variances,
-    settled: Settled,
-    prior: Option<Mat>,
+pub(crate) struct Found {
+    pub(crate) noise: Noise,
+    pub(crate) splits: Splits,
+    pub(crate) variances: Variances,
+    pub(crate) robust: Variances,
+    pub(crate) settled: Settled,
+    pub(crate) prior: Option<Mat>,
 }
 
 fn named(weights: &[Vec<f64>], least: f64) -> Vec<Vec<f64>> {
@@ -294,7 +294,7 @@ fn start(fleet: &Fleet, splits: &Splits, prior: Option<&Mat>) -> Result<Variance
     Ok(Variances::new(robots.collect(), logs.collect(), number))
 }
 
-fn finish(fleet: &Fleet, found: Found, freedom: f64) -> Result<FleetFit, FleetError> {
+pub(crate) fn finish(fleet: &Fleet, found: Found, freedom: f64) -> Result<FleetFit, FleetError> {
     let Found { noise, splits, variances, robust, settled, prior } = found;
     let splits = Arc::new(splits);
     let sweep = Sweep::new(&splits, &variances, prior.as_ref())?;

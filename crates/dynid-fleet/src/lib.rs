@@ -8,8 +8,10 @@
 //! | logs as factors, robots, what varies | [`Fleet`] |
 //! | parameters of type, robots and logs, with spreads | [`fit()`], [`FleetFit`] |
 //! | what is known of a robot before its first log | [`FleetFit::new_robot`] |
+//! | what each robot says of the type, for any estimator | [`FleetFit::said_by_robots`] |
 //! | robots and logs out of the spread | [`FleetFit::robot_outliers`], [`FleetFit::log_outliers`] |
 //! | changes with dates | [`drift()`](drift::drift) |
+//! | a robot that has changed, as it is now | [`FleetFit::robot_now`] |
 //! | parts merged to the same bits in any order | [`tree`] |
 //!
 //! The result depends on the set of logs only: not on their order, nor on the number of threads.
@@ -20,6 +22,8 @@ pub mod drift;
 mod fit;
 mod jackknife;
 mod noise;
+mod now;
+mod of_type;
 mod outliers;
 mod split;
 mod spread;

@@ -110,7 +110,7 @@ impl<'a> Sweep<'a> {
         let p = self.theta.len();
         let (deviation, map) = deviation(
             self.robots[r].view(),
-            self.splits.q,
+            (self.splits.q, 0),
             &self.variances.of_robot(r),
             &self.theta,
             &self.covariance,
@@ -137,7 +137,14 @@ impl<'a> Sweep<'a> {
     /// The deviation of a log from its robot.
     pub(crate) fn log(&self, k: usize, robot: &RobotState) -> Deviation {
         let rows = self.splits.with_slopes(&self.logs[k], &self.splits.logs[k].covariates);
-        deviation(rows.view(), self.splits.q, &self.variances.of_log(k), &robot.values, &robot.covariance).0
+        deviation(
+            rows.view(),
+            (self.splits.q, 0),
+            &self.variances.of_log(k),
+            &robot.values,
+            &robot.covariance,
+        )
+        .0
     }
 
     /// Largest information on every coordinate that one robot has, and one log.
@@ -154,9 +161,10 @@ impl<'a> Sweep<'a> {
 
 /// `C⁻¹ [R_ff ...]` with `S = 1 + R_ff D R_ffᵀ = C Cᵀ`, and `ln |S|`.
 pub(crate) fn whitened(top: &Mat, q: usize, variances: &[f64]) -> (Mat, f64) {
-    let scaled = Mat::from_fn(q, q, |i, j| top[(i, j)] * variances[j].sqrt());
+    let n = top.nrows();
+    let scaled = Mat::from_fn(n, q, |i, j| top[(i, j)] * variances[j].sqrt());
     let mut s = scaled.view() * scaled.transpose();
-    for i in 0..q {
+    for i in 0..n {
         s[(i, i)] += 1.0;
     }
     // At least the unit matrix: positive definite.
@@ -164,7 +172,7 @@ pub(crate) fn whitened(top: &Mat, q: usize, variances: &[f64]) -> (Mat, f64) {
     let mut rows = top.clone();
     solve_lower_in_place(&factor.lower(), &mut rows);
     let lower = factor.lower();
-    (rows, (0..q).map(|i| 2.0 * lower[(i, i)].ln()).sum())
+    (rows, (0..n).map(|i| 2.0 * lower[(i, i)].ln()).sum())
 }
 
 /// Whitened rows of a robot, what it says of the type, and its share of the logarithm of the determinants.
@@ -185,20 +193,29 @@ fn robot(splits: &Splits, variances: &Variances, logs: &[Mat], r: usize) -> (Mat
 }
 
 /// Posterior of a deviation with variances `D` from whitened rows `[f | ... | z]`, and `M C`.
-fn deviation(rows: View<'_>, q: usize, variances: &[f64], x: &[f64], covariance: &Mat) -> (Deviation, Mat) {
+///
+/// `first`: column of the first of the parameters `x`, with the effort behind them; columns of the deviation are the first `q`.
+pub(crate) fn deviation(
+    rows: View<'_>,
+    (q, first): (usize, usize),
+    variances: &[f64],
+    x: &[f64],
+    covariance: &Mat,
+) -> (Deviation, Mat) {
     let p = x.len();
-    let columns = rows.columns(0..p);
+    let columns = rows.columns(first..first + p);
     let fitted = times(&columns, x);
-    let residual: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, p)] - fitted[i]).collect();
+    let residual: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, first + p)] - fitted[i]).collect();
     // K = D R_ffᵀ S⁻¹ of the rows before they were whitened.
     let gain = Mat::from_fn(q, rows.nrows(), |i, j| variances[i] * rows[(j, i)]);
     let mean = gain.times(&residual);
     let m = gain.view() * columns;
     let map = m.view() * covariance;
     let added = map.view() * m.transpose();
+    let own = if first == 0 { m.columns(0..q).to_mat() } else { gain.view() * rows.columns(0..q) };
     let given = Mat::from_fn(q, q, |i, j| {
-        let own = if i == j { variances[i] } else { 0.0 };
-        own - 0.5 * (m[(i, j)] * variances[j] + m[(j, i)] * variances[i])
+        let prior = if i == j { variances[i] } else { 0.0 };
+        prior - 0.5 * (own[(i, j)] * variances[j] + own[(j, i)] * variances[i])
     });
     (Deviation { mean, given, added }, map)
 }

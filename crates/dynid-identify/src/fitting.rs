@@ -9,6 +9,7 @@ use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whi
 use dynid_factor::Factor;
 use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_linalg::Mat;
+use dynid_record::Basis;
 use dynid_rows::conditioning::{
     Conditioning, LogMotion, LogRows, PreparedLog, ReducedGroup, motions, parts_of_motions, textbook_rows,
 };
@@ -30,6 +31,10 @@ const TRACE: f64 = 1e12;
 pub struct Fitted {
     /// The estimate in base columns.
     pub estimate: LinearEstimate,
+    /// What the covariance rests on.
+    pub basis: Basis,
+    /// Robots behind the covariance; 0 where it rests on blocks of time.
+    pub robots: usize,
     /// Covariance for white residuals, of the kept columns.
     pub white: Mat,
     /// Jackknife covariance over time blocks, if there are enough of them.
@@ -88,7 +93,9 @@ impl Fitted {
         let least = known.iter().copied().fold(f64::INFINITY, f64::min);
         let most = known.iter().copied().fold(1.0, f64::max);
         let equal = known.len() < 2 || most <= UNEQUAL * least;
-        if equal && explained.iter().all(|e| *e) {
+        // Rows that others pooled are of all outputs, and free of those that are not explained.
+        let pooled = self.basis != Basis::TimeBlocks;
+        if pooled || equal && explained.iter().all(|e| *e) {
             return estimate.factor.scaled(1.0 / self.inflation.sqrt());
         }
         self.deflated(&estimate.reduced, estimate.x.len(), explained)
@@ -363,6 +370,49 @@ impl Fitted {
             block_length: wanted,
             block_s,
             merged_blocks,
+            basis: Basis::TimeBlocks,
+            robots: 0,
+            estimate,
+        }
+    }
+
+    /// A fit whose covariance, in all columns, comes with its rows, and the robots behind it. `outputs`: of the model; `duration_s`: length of its logs.
+    pub(crate) fn pooled(
+        estimate: LinearEstimate,
+        covariance: &Mat,
+        (basis, robots): (Basis, usize),
+        outputs: usize,
+        duration_s: f64,
+    ) -> Self {
+        let kept = &estimate.solution.kept;
+        let of_kept = Mat::from_fn(kept.len(), kept.len(), |i, j| covariance[(kept[i], kept[j])]);
+        let rows = estimate.model_covariance();
+        let (white, jackknife) = match basis {
+            Basis::Fleet => (of_kept, None),
+            Basis::Robots | Basis::TimeBlocks => (rows, Some(of_kept)),
+        };
+        let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
+        let blocks = estimate.blocks.len();
+        let block_s = duration_s / blocks.max(1) as f64;
+        Fitted {
+            basis,
+            robots,
+            white,
+            jackknife,
+            inflated: None,
+            inflation,
+            inflation_in_time: inflation,
+            repetition_unseen: false,
+            inflation_per_output: vec![None; outputs],
+            block_length: BlockLength {
+                seconds: block_s,
+                blocks,
+                correlation_s: Vec::new(),
+                worst: None,
+                status: if blocks >= MIN_BLOCKS { BlockLengthStatus::Enough } else { BlockLengthStatus::Few },
+            },
+            block_s,
+            merged_blocks: 1,
             estimate,
         }
     }

@@ -5,7 +5,7 @@ mod instruments;
 mod logs;
 mod remedy;
 
-use dynid_estimate::consistent::Status as ConsistentStatus;
+use dynid_estimate::consistent::{ConsistentEstimate, Status as ConsistentStatus};
 use dynid_estimate::identifiability::Verdict as TrustVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
 
@@ -19,6 +19,7 @@ use crate::identification::Identification;
 use crate::joint_stiffness::JointStiffness;
 use crate::journal_doubt;
 use crate::load_rounds::LoadRounds;
+use dynid_record::Basis;
 pub use dynid_record::Status;
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
@@ -477,6 +478,24 @@ fn mask(id: &Identification) -> Option<CheckResult> {
 
 fn blocks(id: &Identification) -> CheckResult {
     let fitted = &id.fitted;
+    let rests_on = match fitted.basis {
+        Basis::TimeBlocks => return time_blocks(id),
+        Basis::Robots => {
+            "standard deviations come from leaving out one robot at a time, so what differs between robots and what colours residuals is covered"
+        }
+        Basis::Fleet => {
+            "standard deviations are those of the mixed model of the fleet: this robot's own logs, and how robots of its type differ"
+        }
+    };
+    let robots = fitted.robots;
+    let enough = robots >= 20;
+    let few = if enough { "" } else { "; so few robots tell little of how robots of the type differ" };
+    let meaning = format!("{rests_on}{few}");
+    check(graded(enough, true), CheckName::Robots, Some(robots as f64), "", "at least 20", meaning)
+}
+
+fn time_blocks(id: &Identification) -> CheckResult {
+    let fitted = &id.fitted;
     let wanted = fitted.block_length.seconds;
     let short = wanted > 1.01 * fitted.block_s;
     let period = id.trained.iter().filter_map(|log| log.repeats_after_s).reduce(f64::min);
@@ -524,6 +543,29 @@ fn blocks(id: &Identification) -> CheckResult {
     )
 }
 
+/// Consistency may cost this many times what chance makes of it before the robot file or the model contradicts the data.
+const BEYOND_CHANCE: f64 = 10.0;
+
+/// The price of consistency where nothing is held out: against what chance makes of as many parameters.
+fn price_over_chance(id: &Identification, found: &ConsistentEstimate) -> CheckResult {
+    let chance = id.fitted.inflation * id.fit().solution.kept.len() as f64;
+    let over = if chance > 0.0 { found.price() / chance } else { 0.0 };
+    let settled = found.status != ConsistentStatus::Stalled;
+    let meaning = if over <= 1.0 {
+        "bodies that can exist, and friction that takes energy out, cost no more of the fit than chance does"
+    } else {
+        "bodies that can exist, or friction that takes energy out, are not what the logs say: the robot file, the model or the logs are wrong"
+    };
+    check(
+        graded(over <= 1.0 && settled, over <= BEYOND_CHANCE),
+        CheckName::PriceOfConsistency,
+        Some(over),
+        "times chance",
+        "at most 1",
+        meaning,
+    )
+}
+
 /// Held-out error may rise by this much before consistency counts as dear, percent.
 const CHEAP: f64 = 2.0;
 /// Beyond this the robot file or the model contradicts the data, percent.
@@ -542,7 +584,10 @@ fn consistency(id: &Identification) -> Option<CheckResult> {
         logs.filter_map(|(free, with)| rise(free.filtered.relative_error, with.filtered.relative_error));
     let validation = logs.reduce(f64::max);
     let cost = folds.into_iter().chain(validation).fold(f64::NEG_INFINITY, f64::max);
-    let rise = cost.is_finite().then_some(cost);
+    if !cost.is_finite() {
+        return Some(price_over_chance(id, found));
+    }
+    let rise = Some(cost);
     let each = match (folds, validation) {
         (Some(folds), Some(logs)) => {
             format!(" ({folds:+.1} % on held-out folds, {logs:+.1} % on validation logs)")

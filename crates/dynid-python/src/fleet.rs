@@ -15,6 +15,7 @@ use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 
 use crate::error::raise;
+use crate::estimate::Estimate;
 use crate::log::Log;
 use crate::settings::{as_json, parsed};
 use crate::work;
@@ -215,6 +216,24 @@ impl Fleet {
         let pages = py.detach(|| self.found.robot_pages(&self.file, &asked)).map_err(|e| raise(py, &e))?;
         let page = pages.into_iter().find(|(robot, _)| robot == name);
         page.map(|(_, page)| page).ok_or_else(|| PyKeyError::new_err(name.to_owned()))
+    }
+
+    #[pyo3(signature = (robot=None))]
+    fn estimate(&self, py: Python<'_>, robot: Option<&str>) -> PyResult<Estimate> {
+        let named = |name: &str| {
+            let found = self.file.robots.iter().find(|r| r.name == name);
+            found.ok_or_else(|| PyKeyError::new_err(name.to_owned()))
+        };
+        let robot = robot.map(named).transpose()?;
+        let solved = || {
+            let of_type = self.found.type_model(&self.file)?;
+            let model = match robot {
+                Some(robot) => self.found.robot_model(robot, &of_type)?,
+                None => of_type,
+            };
+            Estimate::new(self.found.estimate(&model), Some(model), None)
+        };
+        py.detach(solved).map_err(|e| raise(py, &e))
     }
 }
 

@@ -104,6 +104,20 @@ impl From<Outcome> for Status {
 }
 
 words! {
+    /// What standard deviations rest on.
+    #[derive(Default)]
+    Basis {
+        /// Blocks of time, left out one at a time; of few of them the scores of their residuals.
+        #[default]
+        TimeBlocks = "time blocks",
+        /// Robots of a type, left out one at a time.
+        Robots = "robots",
+        /// A mixed model of a fleet: the logs of one robot, and how robots of its type differ.
+        Fleet = "fleet",
+    }
+}
+
+words! {
     /// Where the value of a parameter comes from.
     ParameterVerdict {
         /// The logs determine it.

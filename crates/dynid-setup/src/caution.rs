@@ -20,11 +20,12 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 36] = [
+const ORDER: [&str; 38] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
     CheckName::Recipe.word(),
+    FLEET,
     CheckName::EffortScale.word(),
     CheckName::ValidationFit.word(),
     CheckName::TrainingFit.word(),
@@ -44,6 +45,7 @@ const ORDER: [&str; 36] = [
     CheckName::Delay.word(),
     CheckName::ReversalMask.word(),
     CheckName::TimeBlocks.word(),
+    CheckName::Robots.word(),
     CheckName::Whiteness.word(),
     CheckName::Condition.word(),
     CheckName::TermsOfLogs.word(),
@@ -61,6 +63,8 @@ const ORDER: [&str; 36] = [
 
 /// A finding of the pre-flight, whatever its name.
 const FINDING: &str = "finding";
+/// What a fleet says of its type, or of the robot.
+pub const FLEET: &str = "fleet";
 /// Friction that drives the motion, or rises from rest.
 pub const FRICTION: &str = "identified friction";
 /// Known friction and its range.

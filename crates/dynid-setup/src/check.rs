@@ -42,6 +42,8 @@ dynid_record::words! {
         Residual = "residual against sensor noise",
         /// Dependence on rows near reversal.
         ReversalMask = "sensitivity to the reversal mask",
+        /// Robots behind standard deviations.
+        Robots = "robots behind the standard deviations",
         /// Stiffness of elastic joints.
         Stiffness = "stiffness told by deformation",
         /// What logs have of their own.

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use dynid_config::pages::{picture, plain, settings_table};
 use dynid_estimate::linear::{LinearMethod, OwnEstimator};
+use dynid_record::Basis;
 use dynid_report as report;
 use dynid_report::{Fact, Value};
 
@@ -112,6 +113,9 @@ impl Shown<'_> {
                     "estimator",
                     own.unwrap_or(match self.settings.estimator.method {
                         Method::Ols => "ordinary least squares",
+                        _ if self.fitted.basis != Basis::TimeBlocks => {
+                            "generalised least squares of the mixed model of a fleet"
+                        }
                         Method::Wls => "weighted least squares, residual variances found along the way",
                         Method::Huber => "Huber's loss, scales found along the way",
                         Method::Tukey => "Tukey's biweight, scales found along the way",
@@ -137,7 +141,11 @@ impl Shown<'_> {
                 Fact::new("converged", self.fit().converged, ""),
                 Fact::new(
                     "standard deviations",
-                    if self.fitted.jackknife.is_some() {
+                    if self.fitted.basis == Basis::Fleet {
+                        "those of the mixed model"
+                    } else if self.fitted.basis == Basis::Robots {
+                        "jackknife over robots"
+                    } else if self.fitted.jackknife.is_some() {
                         "jackknife over time blocks"
                     } else if self.fitted.is_robust() {
                         "white residuals, inflated as few time blocks say"
@@ -146,7 +154,10 @@ impl Shown<'_> {
                     },
                     "",
                 ),
-                Fact::new("time blocks", self.blocks(), ""),
+                match self.fitted.robots {
+                    0 => Fact::new("time blocks", self.blocks(), ""),
+                    robots => Fact::new("robots", robots, ""),
+                },
                 Fact::new("every identified body physical", estimate.feasible, ""),
             ],
             base_parameters: trust::base_parameters(estimate),

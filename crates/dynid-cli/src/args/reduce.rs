@@ -65,10 +65,10 @@ pub(crate) struct FleetArgs {
     /// Share of the robots named for a change that may have none, above 0 and below 1 (default: 0.05).
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub(crate) false_discoveries: Option<f64>,
-    /// Robot that gets a page of its own even if nothing is the matter; repeat for several.
+    /// Robot that gets a page and a model of its own even if nothing is the matter; repeat for several.
     #[arg(long, value_name = "NAME")]
     pub(crate) robot: Vec<String>,
-    /// Folder for fleet.json, report.html and robots/NAME.html.
+    /// Folder for fleet.json, report.html, type.json, type.html, robots/NAME.html and robots/NAME.json.
     #[arg(long, value_name = "FOLDER", default_value = "dynid-fleet", value_hint = ValueHint::DirPath)]
     pub(crate) out: PathBuf,
     #[command(flatten)]

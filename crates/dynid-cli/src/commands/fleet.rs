@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynid::fleet::{
-    ChangeRecord, FactorStore, FleetFile, FleetSettings, Outcome, RobotRecord, StoreReading, fleet, manifest,
+    ChangeRecord, FactorStore, FleetFile, FleetSettings, FleetStep, Outcome, RobotRecord, StoreReading,
+    fleet, manifest,
 };
-use dynid::reduce;
+use dynid::{Identification, reduce};
 use dynid_terminal::message::{Failure, Notes, data, json};
 use dynid_terminal::outputs;
 use dynid_terminal::progress::Progress;
@@ -75,7 +76,7 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
         false_discoveries: args.false_discoveries.unwrap_or(FleetSettings::default().false_discoveries),
     };
     let inputs: Vec<&Path> = args.folders.iter().map(PathBuf::as_path).collect();
-    let files = ["fleet.json", "report.html"].map(|name| args.out.join(name));
+    let files = ["fleet.json", "report.html", "type.json", "type.html"].map(|name| args.out.join(name));
     let set = outputs::prepare_folder(&files, &inputs, args.force)?;
     let progress = Progress::new(args.print.quiet);
     let found = fleet(&args.folders, &settings, &mut |step| progress.fleet(step))?;
@@ -90,20 +91,39 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
     file.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     let page = found.report(&file)?;
     let pages = found.robot_pages(&file, &args.robot)?;
-    let names: Vec<PathBuf> =
-        pages.iter().map(|(name, _)| args.out.join("robots").join(page_name(name))).collect();
+    progress.fleet(FleetStep::Models);
+    let of_type = found.type_model(&file)?;
+    let stamped = |model: &Identification| {
+        let mut estimate = found.estimate(model);
+        estimate.provenance.command_line.clone_from(&file.provenance.command_line);
+        estimate.provenance.revision.clone_from(&file.provenance.revision);
+        estimate
+    };
+    let estimate = stamped(&of_type);
+    let type_page = dynid::report_page(&of_type, &estimate)?;
+    let with_pages: Vec<&RobotRecord> =
+        file.robots.iter().filter(|r| pages.iter().any(|(name, _)| *name == r.name)).collect();
+    let models = found.robot_models(&with_pages, &of_type)?;
+    let of_robots: Vec<(PathBuf, String)> = (pages.into_iter().zip(&models))
+        .flat_map(|((name, page), model)| {
+            let at = |kind: &str| args.out.join("robots").join(format!("{}.{kind}", file_name(&name)));
+            [(at("html"), page), (at("json"), stamped(model).to_json())]
+        })
+        .collect();
+    let names: Vec<PathBuf> = of_robots.iter().map(|(path, _)| path.clone()).collect();
     let more = match names.is_empty() {
         true => None,
         false => Some(outputs::prepare_folder(&names, &inputs, args.force)?),
     };
     drop(progress);
     let text = file.to_json();
-    set.write(0, text.as_bytes())?;
-    set.write(1, page.as_bytes())?;
+    for (number, bytes) in [&text, &page, &estimate.to_json(), &type_page].into_iter().enumerate() {
+        set.write(number, bytes.as_bytes())?;
+    }
     let mut written = set.publish()?;
     if let Some(more) = more {
-        for (number, (_, page)) in pages.iter().enumerate() {
-            more.write(number, page.as_bytes())?;
+        for (number, (_, bytes)) in of_robots.iter().enumerate() {
+            more.write(number, bytes.as_bytes())?;
         }
         written.extend(more.publish()?);
     }
@@ -111,16 +131,17 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
     notes.warnings(&file.warnings);
     data(&if args.print.json { text } else { summary(&file) })?;
     notes.written(&written);
+    notes.tell("`dynid export` puts `type.json`, or the JSON of a robot, into a robot file");
     Ok(0)
 }
 
-/// Name of a robot's page: letters, digits, `-`, `_` and `.` stay, others are written as their number.
-fn page_name(robot: &str) -> String {
+/// Name of the files of a robot: letters, digits, `-`, `_` and `.` stay, others are written as their number.
+fn file_name(robot: &str) -> String {
     let kept = |c: char| match c {
         c if c.is_alphanumeric() || "-_.".contains(c) => c.to_string(),
         c => format!("~{:x}", u32::from(c)),
     };
-    robot.chars().map(kept).collect::<String>() + ".html"
+    robot.chars().map(kept).collect()
 }
 
 fn summary(file: &FleetFile) -> String {

@@ -74,6 +74,29 @@ fn check_rows(groups: &[ReducedGroup], source: &dyn RowSource) -> Result<(), Lin
     if same { Ok(()) } else { Err(LinearError::OtherRows { expected: groups.len(), found: shapes.len() }) }
 }
 
+/// Least squares of a group of rows whose residuals are known to have a variance of one, such as those that a mixed model whitened.
+///
+/// `total`: columns of the problem. The weight is one, and `C = (RᵀR)⁻¹`. Rank deficiency is a status of the estimate.
+pub fn of_unit_variance(group: ReducedGroup, total: usize) -> LinearEstimate {
+    let factor = group.merged(total);
+    let solution = ols(&factor);
+    let fit = GroupFit {
+        log: group.log,
+        output: group.output,
+        scale: group.scale,
+        variance: 1.0,
+        weight: 1.0,
+        leverage: solution.kept.len() as f64,
+        rss: factor.rss(&solution.x),
+        rows: factor.rows(),
+        at_floor: false,
+        down_weighted: 0.0,
+        rejected: 0.0,
+        curvature: 1.0,
+    };
+    assemble(LinearMethod::Wls, solution.x, &solution.kept, vec![fit], vec![group])
+}
+
 fn group_fits(groups: &[ReducedGroup], start: &WlsEstimate) -> Vec<GroupFit> {
     let of = |(group, found): (&ReducedGroup, &super::GroupVariance)| GroupFit {
         log: group.log,

@@ -10,7 +10,7 @@ mod row_scores;
 
 pub use difference::{DifferenceFit, explain_difference};
 pub(crate) use estimate::assemble;
-pub use estimate::estimate;
+pub use estimate::{estimate, of_unit_variance};
 pub(crate) use irls::robust_scales;
 pub use linear_estimate::{GroupFit, LinearEstimate};
 pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};

@@ -1,5 +1,6 @@
 //! Tests of the crate.
 
 mod golden;
+mod models;
 mod simulated;
 mod studies;

@@ -1,6 +1,6 @@
 //! What the result file says about consistency, precision and essential parameters.
 
-use dynid_record::{ConsistencyForm, ConsistencyStatus};
+use dynid_record::{Basis, ConsistencyForm, ConsistencyStatus};
 use serde::{Deserialize, Serialize};
 
 use super::LogFit;
@@ -60,9 +60,12 @@ pub struct PrecisionRecord {
     pub variance_inflation: f64,
     /// Variance inflation per joint.
     pub variance_inflation_per_joint: Vec<Option<f64>>,
-    /// Number of time blocks behind the standard deviations.
+    /// What the standard deviations rest on; absent from files of earlier versions: time blocks.
+    #[serde(default)]
+    pub basis: Basis,
+    /// Number of time blocks behind the standard deviations, or of robots.
     pub blocks: usize,
-    /// Length of the time blocks, s.
+    /// Length of the time blocks, s; of robots, of the logs of one on the average.
     pub block_s: f64,
     /// Length that the correlation of the residuals asks for, s.
     pub wanted_block_s: f64,

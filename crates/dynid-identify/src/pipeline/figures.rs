@@ -44,12 +44,11 @@ pub(super) fn fit_rows(
     conditioning: Option<&Conditioning>,
     kernel_hz: f64,
 ) -> FitRows {
-    let outputs = fit.groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    let outputs = row_rms.len();
     let sigma = (0..outputs)
         .map(|output| {
-            if fit.method == LinearMethod::Cloe {
-                // Its groups are those of positions.
-                return row_rms.get(output).copied().flatten();
+            if of_other_rows(fit, outputs) {
+                return row_rms[output];
             }
             // Of several logs the noisiest decides.
             let own = fit.groups.iter().filter(|g| g.output == output && g.scale == 0 && g.rows > 0);
@@ -63,15 +62,18 @@ pub(super) fn fit_rows(
     }
 }
 
+/// Whether a fit is one of other rows than those of the efforts of `outputs`: of positions, or of efforts that others pooled.
+fn of_other_rows(fit: &LinearEstimate, outputs: usize) -> bool {
+    fit.method == LinearMethod::Cloe || fit.groups.iter().any(|g| g.output >= outputs)
+}
+
 /// Residual variances of groups of measured rows: those of the fit, or of what it leaves where it is one of other rows.
-fn effort_variances(groups: &[ReducedGroup], fit: &LinearEstimate) -> Vec<f64> {
-    match fit.method {
-        LinearMethod::Cloe => {
-            let of = |g: &ReducedGroup| g.merged(fit.x.len()).rss(&fit.x) / g.rows().max(1) as f64;
-            groups.iter().map(of).collect()
-        }
-        _ => fit.groups.iter().map(|g| g.variance).collect(),
+fn effort_variances(groups: &[ReducedGroup], fit: &LinearEstimate, outputs: usize) -> Vec<f64> {
+    if of_other_rows(fit, outputs) {
+        let of = |g: &ReducedGroup| g.merged(fit.x.len()).rss(&fit.x) / g.rows().max(1) as f64;
+        return groups.iter().map(of).collect();
     }
+    fit.groups.iter().map(|g| g.variance).collect()
 }
 
 pub(super) fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64>> {
@@ -96,7 +98,7 @@ pub(super) fn residual_ratios(
 ) -> Vec<Option<f64>> {
     let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
     let spread = 0.265 / kernel_hz;
-    let variances = effort_variances(groups, fit);
+    let variances = effort_variances(groups, fit, outputs);
     (0..outputs)
         .map(|output| {
             let (mut found, mut expected) = (0.0, 0.0);

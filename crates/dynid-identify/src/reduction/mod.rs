@@ -24,6 +24,7 @@
 //! robot file. Figures of a fit are those of its rows.
 
 mod file;
+mod pooled;
 mod recipe;
 mod reduce;
 mod solve;
@@ -44,6 +45,7 @@ use crate::log::Log;
 pub use crate::reduction_error::{FactorFileFault, ReductionError};
 pub use crate::trained_log::{RowFit, TrainedLog};
 pub use file::VERSION;
+pub use pooled::Pooled;
 pub use recipe::{Blocks, Choices, Column, Output, Recipe};
 pub use reduce::{Reducer, WindowSettings};
 
@@ -131,7 +133,7 @@ impl ReducedFinding {
     }
 
     /// The finding of log `number`.
-    fn finding(&self, log: &str, number: usize) -> Finding {
+    pub fn finding(&self, log: &str, number: usize) -> Finding {
         let ReducedFinding { id, severity, joint, evidence, remedy } = self.clone();
         Finding { id, severity, joint, log: log.to_owned(), evidence, remedy, number, fixes: Vec::new() }
     }

@@ -5,15 +5,18 @@ use dynid_estimate::metrics::{ChannelSums, FitSums};
 use dynid_factor::groups::ReducedGroup;
 
 use super::recipe::{Solved, training_log};
-use super::{LogFacts, Reduction, ReductionError};
+use super::{LogFacts, Recipe, Reduction, ReductionError};
 use crate::Error;
-use crate::consistency;
+use crate::consistency::{self, Consistent};
 use crate::finding::Finding;
 use crate::fitting::{self, Fitted, RowResiduals};
+use crate::friction_power::FrictionPower;
 use crate::identification::Identification;
 use crate::log::{Log, LogSource};
 use crate::overlap::Overlaps;
-use crate::pipeline::{Beside, EXPLAINED, ModelFit, Step, assemble, explained};
+use crate::pipeline::{Beside, EXPLAINED, Left, ModelFit, Step, assemble, explained};
+use crate::problem::Problem;
+use crate::shape::ShapeFit;
 use crate::trained_log::{RowFit, TrainedLog};
 
 impl Reduction {
@@ -48,10 +51,68 @@ impl Reduction {
         let fitted = Fitted::with_blocks(found, self.recipe.blocks.wanted_s, &logs);
         progress(Step::Consistency);
         let consistent = consistency::consistent(&problem, &fitted, &groups)?;
-        let rates: Vec<f64> = self.logs.iter().map(|log| log.facts.log.rate_hz).collect();
         let base = problem.structure.base.values(&consistent.values);
+        let row_fits: Vec<RowFit> = (self.logs.iter())
+            .map(|log| row_fit(&log.facts, &log.groups, &base, self.recipe.outputs.len()))
+            .collect();
+        let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
+        let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
+        let facts = || self.logs.iter().map(|log| &log.facts);
+        let of_log = |(k, facts): (usize, &LogFacts)| -> Vec<Finding> {
+            facts.findings.iter().map(|f| f.finding(&facts.name, k)).collect()
+        };
+        let findings = facts().enumerate().flat_map(of_log).collect();
+        let solution = Solution { fitted, groups, consistent, shapes, power };
+        let beside = Beside {
+            training: facts().map(named).collect(),
+            sources: facts().map(source).collect(),
+            findings,
+            overlaps: Overlaps::default(),
+            own_delays: Vec::new(),
+            warnings: facts().flat_map(|facts| facts.cautions.iter().cloned()).collect(),
+            reading: Vec::new(),
+            comparison: None,
+        };
+        let rows_explained = |j: usize| {
+            row_fits.iter().filter_map(move |rows| rows.fit.channels[j].r2).all(|r2| r2 >= EXPLAINED)
+        };
+        let rows_explained: Vec<bool> = (0..self.recipe.outputs.len()).map(rows_explained).collect();
+        let (mut out, left) = self.recipe.assembled(problem, solution, beside, row_fits)?;
+        for log in validation {
+            progress(Step::Validate(log.log.name().to_owned()));
+            out.validate(log)?;
+        }
+        progress(Step::Trust);
+        let samples = explained(out.validation.iter(), self.recipe.outputs.len(), &out.consistent);
+        out.explained = samples.into_iter().zip(rows_explained).map(|(held, rows)| held && rows).collect();
+        out.judge(&left)?;
+        Ok(out)
+    }
+}
+
+/// A fit of a recipe's columns.
+pub(super) struct Solution {
+    pub(super) fitted: Fitted,
+    /// Rows of the efforts, output by output.
+    pub(super) groups: Vec<ReducedGroup>,
+    pub(super) consistent: Consistent,
+    pub(super) shapes: Option<ShapeFit>,
+    pub(super) power: FrictionPower,
+}
+
+impl Recipe {
+    /// An identification without samples, which is not judged yet.
+    pub(super) fn assembled(
+        &self,
+        problem: Problem,
+        solution: Solution,
+        beside: Beside,
+        row_fits: Vec<RowFit>,
+    ) -> Result<(Identification, Left), Error> {
+        let Solution { fitted, groups, consistent, shapes, power } = solution;
+        let rates: Vec<f64> = beside.training.iter().map(|log| log.rate_hz).collect();
         let fit = ModelFit {
-            conditioning: Some(self.recipe.conditioning(&rates)),
+            conditioning: Some(self.conditioning(&rates)),
             friction: Vec::new(),
             cyclic: Vec::new(),
             shapes,
@@ -63,63 +124,45 @@ impl Reduction {
             power,
             loads: None,
         };
-        let row_fits: Vec<RowFit> = (self.logs.iter())
-            .map(|log| row_fit(&log.facts, &log.groups, &base, self.recipe.outputs.len()))
-            .collect();
-        let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
-        let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
-        let facts = || self.logs.iter().map(|log| &log.facts);
-        let of_log = |(k, facts): (usize, &LogFacts)| -> Vec<Finding> {
-            facts.findings.iter().map(|f| f.finding(&facts.name, k)).collect()
-        };
-        let findings = facts().enumerate().flat_map(of_log).collect();
-        let beside = Beside {
-            training: facts().map(named).collect(),
-            sources: facts().map(source).collect(),
-            findings,
-            overlaps: Overlaps::default(),
-            own_delays: Vec::new(),
-            warnings: facts().flat_map(|facts| facts.cautions.iter().cloned()).collect(),
-            reading: Vec::new(),
-            comparison: None,
-        };
         let (mut out, left) = assemble(problem, fit, beside)?;
-        for log in validation {
-            progress(Step::Validate(log.log.name().to_owned()));
-            out.validate(log)?;
-        }
-        progress(Step::Trust);
-        let rows = |j: usize| {
-            row_fits.iter().filter_map(move |rows| rows.fit.channels[j].r2).all(|r2| r2 >= EXPLAINED)
-        };
-        let samples = explained(out.validation.iter(), self.recipe.outputs.len(), &out.consistent);
-        out.explained = samples.into_iter().enumerate().map(|(j, held)| held && rows(j)).collect();
-        out.recipe_doubts.clone_from(&self.recipe.doubts);
+        out.recipe_doubts.clone_from(&self.doubts);
         out.row_fits = row_fits;
-        out.judge(&left)?;
-        Ok(out)
+        Ok((out, left))
     }
 }
 
 /// How well the rows of a log are explained by values in base columns.
 fn row_fit(facts: &LogFacts, groups: &[ReducedGroup], x: &[f64], outputs: usize) -> RowFit {
-    let mut of_outputs = vec![ChannelSums::default(); outputs];
+    let mut left = vec![(0, 0.0); outputs];
     for group in groups.iter().filter(|g| g.scale == 0 && g.rows() > 0) {
-        let (j, n) = (group.output, group.rows() as f64);
-        let efforts = &facts.efforts[j];
-        let about_mean = efforts.squares - efforts.sum * efforts.sum / n;
-        // Rows of a joint at rest hold friction that no model of the speed tells.
-        let varies = facts.log.moves[j] && about_mean > 1e-12 * efforts.squares;
-        of_outputs[j] = ChannelSums {
-            samples: group.rows(),
-            error_energy: group.merged(x.len()).rss(x),
-            energy: efforts.squares,
-            variation: if varies { about_mean } else { 0.0 },
-            range: (efforts.greatest - efforts.least).max(0.0),
-            ..ChannelSums::default()
-        };
+        left[group.output] = (group.rows(), group.merged(x.len()).rss(x));
     }
-    let mut sums = FitSums::default();
-    of_outputs.iter().for_each(|of_output| sums.add(of_output, true));
-    RowFit { log: facts.name.clone(), fit: sums.fit() }
+    RowFit { log: facts.name.clone(), fit: facts.row_sums(&left).fit() }
+}
+
+impl LogFacts {
+    /// Sums over the rows of the widest kernel, output by output. `left`: per output the rows, and the sum of their squared residuals.
+    pub fn row_sums(&self, left: &[(usize, f64)]) -> FitSums {
+        let mut sums = FitSums::default();
+        for (j, (rows, error_energy)) in left.iter().enumerate() {
+            if *rows == 0 {
+                sums.add(&ChannelSums::default(), true);
+                continue;
+            }
+            let efforts = &self.efforts[j];
+            let about_mean = efforts.squares - efforts.sum * efforts.sum / *rows as f64;
+            // Rows of a joint at rest hold friction that no model of the speed tells.
+            let varies = self.log.moves[j] && about_mean > 1e-12 * efforts.squares;
+            let of_output = ChannelSums {
+                samples: *rows,
+                error_energy: *error_energy,
+                energy: efforts.squares,
+                variation: if varies { about_mean } else { 0.0 },
+                range: (efforts.greatest - efforts.least).max(0.0),
+                ..ChannelSums::default()
+            };
+            sums.add(&of_output, true);
+        }
+        sums
+    }
 }

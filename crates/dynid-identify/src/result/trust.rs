@@ -66,7 +66,8 @@ impl Identification {
         PrecisionRecord {
             variance_inflation: self.fitted.inflation,
             variance_inflation_per_joint: self.fitted.inflation_per_output.clone(),
-            blocks: self.blocks(),
+            basis: self.fitted.basis,
+            blocks: if self.fitted.robots > 0 { self.fitted.robots } else { self.blocks() },
             block_s: self.fitted.block_s,
             wanted_block_s: self.fitted.block_length.seconds,
             correlation_s: self.fitted.block_length.correlation_s.clone(),

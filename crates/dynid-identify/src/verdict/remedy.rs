@@ -83,6 +83,8 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
                  `[elements]`; or fix what is left out: `reversal_mask = 0.1` under `[conditioning]`"
             .to_owned(),
         CheckName::TimeBlocks | CheckName::Whiteness => longer(id),
+        CheckName::Robots => "reduce logs of more robots of the type into the folder: `dynid reduce TYPE.factors --manifest MORE.csv --out FOLDER`"
+            .to_owned(),
         CheckName::Condition => format!("`{}` writes a motion that lowers it; add its log as a second `[[log]]`", files.design()),
         CheckName::TermsOfLogs => format!(
             "take terms that the logs do not tell out of `own` of the `[[log]]`; `{}` examines the logs",

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from . import _native
-from ._estimate import Factor, Progress, _write, teller, written
+from ._estimate import Estimate, Factor, Progress, _write, teller, written
 from ._log import Log
 from ._settings import as_json
 from ._table import Table
@@ -243,6 +243,14 @@ class Fleet:
     def robot_page(self, name: str, path: str | os.PathLike[str] | None = None) -> str:
         """The page of a robot as HTML, written to `path` if that is given. Raises `KeyError` if there is none of the name."""
         return written(path, self._native.robot_page(name))
+
+    def estimate(self, robot: str | None = None) -> Estimate:
+        """The model that robots of the type share, or that of one robot: bodies that can exist, intervals and verdicts, ready to be exported.
+
+        A robot has the bodies of its type, and what its own logs and the fleet say of the rest; one that has changed is what it is at its last
+        log. It equals `type.json`, or the JSON of the robot, that `dynid fleet` writes. Raises `KeyError` if there is no robot of the name.
+        """
+        return Estimate(self._native.estimate(robot))
 
     def __repr__(self) -> str:
         return f"<dynid.Fleet of {self.record['robot_type']}: {self.status}>\n{self.headline}"

@@ -158,6 +158,7 @@ pub(super) fn precision(joints: usize) -> Precision {
         })
     };
     Precision {
+        basis: dynid_record::Basis::TimeBlocks,
         variance_inflation: Some(6.2),
         variance_inflation_per_joint: (0..joints).map(|j| (j % 2 == 1).then_some(5.0 + j as f64)).collect(),
         blocks: Some(26),

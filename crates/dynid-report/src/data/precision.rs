@@ -1,5 +1,6 @@
 //! What the residuals say about the standard deviations.
 
+use dynid_record::Basis;
 use serde::Serialize;
 
 /// Precision of the estimate.
@@ -9,7 +10,9 @@ pub struct Precision {
     pub variance_inflation: Option<f64>,
     /// Variance inflation per joint, where it can be told.
     pub variance_inflation_per_joint: Vec<Option<f64>>,
-    /// Number of time blocks behind the standard deviations.
+    /// What the standard deviations rest on.
+    pub basis: Basis,
+    /// Number of time blocks behind the standard deviations, or of robots.
     pub blocks: Option<u64>,
     /// Length of the time blocks, s.
     pub block_s: Option<f64>,

@@ -120,6 +120,12 @@ pub(super) fn text(name: Name) -> Text {
             "Choose another friction law, or state the mask.",
             "dynid identify ROBOT --log LOG --reversal-mask 0.1",
         ),
+        Name::Robots => Text(
+            "Of a model that a fleet gives: how many robots tell how robots of the type differ. Standard deviations of the type come from leaving out \
+             one robot at a time, those of a robot from the mixed model. Few robots make them uncertain.",
+            "Add logs of more robots of the type.",
+            "dynid reduce TYPE.factors --manifest MORE.csv --out FOLDER",
+        ),
         Name::Stiffness => Text(
             "Joints with springs: their stiffness told a second time, by the deformation between the two encoders.",
             "Record a motion that loads the springs more, or take the joints as stiff ones.",

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use dynid_factor::Factor;
 use dynid_files::digest::sha256_bytes;
 use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetError, FleetLog};
-use dynid_identify::reduction::{Origin, ReducedLog};
+use dynid_identify::reduction::{LogFacts, Origin, ReducedLog};
 use dynid_linalg::{AsView, Mat};
 use dynid_model::Owner;
 
@@ -23,8 +23,8 @@ const SAME_MOTION: f64 = 0.05;
 pub(super) struct Built {
     /// Robots, in the order of the fleet's.
     pub(super) robots: Vec<String>,
-    /// Logs, in the order of the fleet's.
-    pub(super) logs: Vec<String>,
+    /// What is known of logs beside their factors, in the order of the fleet's.
+    pub(super) facts: Vec<LogFacts>,
     /// Per log its start, s since 1970.
     pub(super) starts: Vec<Option<f64>>,
     /// Logs without a date.
@@ -52,7 +52,7 @@ pub(super) fn fleet(
     let (varying, positive) = varying(recipe, settings)?;
     let scales = recipe.choices.scales_hz.len();
     let undated = origins.iter().filter(|o| o.start_s.is_none()).count();
-    let of_log = |(log, origin): (ReducedLog, &Origin)| {
+    let of_log = |(log, origin): (&ReducedLog, &Origin)| {
         let channel = |g: &dynid_factor::groups::ReducedGroup| ChannelFactor {
             channel: g.output * scales + g.scale,
             columns: g.columns.clone(),
@@ -70,8 +70,8 @@ pub(super) fn fleet(
             channels: log.groups.iter().filter(|g| g.rows() > 0).map(channel).collect(),
         }
     };
-    let logged: Vec<String> = logs.iter().map(|log| log.facts.log.name.clone()).collect();
-    let logs: Vec<FleetLog> = logs.into_iter().zip(&origins).map(of_log).collect();
+    let of_fleet: Vec<FleetLog> = logs.iter().zip(&origins).map(of_log).collect();
+    let facts: Vec<LogFacts> = logs.into_iter().map(|log| log.facts).collect();
     let key = |name: &String| u64::from_be_bytes(std::array::from_fn(|i| sha256_bytes(name.as_bytes())[i]));
     let fleet = Fleet {
         columns: recipe.columns.len(),
@@ -79,7 +79,7 @@ pub(super) fn fleet(
         robots: robots.iter().map(key).collect(),
         covariates: covariates.len(),
         varying,
-        logs,
+        logs: of_fleet,
     };
     warnings.extend(same_motion(&fleet, &robots));
     if fleet.varying.is_empty() {
@@ -91,7 +91,7 @@ pub(super) fn fleet(
     if undated > 0 {
         warnings.push(format!(
             "{undated} of {} logs state no start: changes with time were not looked for",
-            logged.len()
+            facts.len()
         ));
     } else if covariates.is_empty() {
         warnings.push(
@@ -100,7 +100,7 @@ pub(super) fn fleet(
         );
     }
     let starts = origins.iter().map(|o| o.start_s).collect();
-    Ok((fleet, Built { robots, logs: logged, starts, undated, covariates, positive, warnings }))
+    Ok((fleet, Built { robots, facts, starts, undated, covariates, positive, warnings }))
 }
 
 /// Covariates that are taken.

@@ -7,6 +7,7 @@
 mod build;
 mod failure;
 mod manifest;
+mod models;
 mod one_log;
 mod read;
 mod record;
@@ -15,8 +16,9 @@ mod store;
 
 use std::path::PathBuf;
 
-use dynid_fleet::drift::{Drift, DriftSettings, drift};
-use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, fit};
+use dynid_fleet::drift::{Change, Drift, DriftSettings, History, drift};
+use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, RobotFit, fit};
+use rayon::prelude::*;
 
 pub use dynid_identify::reduction::Origin;
 
@@ -65,6 +67,8 @@ pub enum FleetStep {
     Fit,
     /// Changes with time.
     Drift,
+    /// Models of the type and of robots.
+    Models,
 }
 
 impl std::fmt::Display for FleetStep {
@@ -73,6 +77,7 @@ impl std::fmt::Display for FleetStep {
             FleetStep::Read => "reading factors",
             FleetStep::Fit => "fitting the fleet",
             FleetStep::Drift => "looking for changes",
+            FleetStep::Models => "bodies that can exist",
         })
     }
 }
@@ -176,6 +181,8 @@ pub struct FleetResult {
     pub drift: Option<Drift>,
     /// Logs that could not be reduced or read.
     pub failures: Vec<Failure>,
+    /// Robots that have changed, at their last log.
+    now: Vec<Option<RobotFit>>,
     robot_outliers: Vec<Outlier>,
     log_outliers: Vec<Outlier>,
     built: Built,
@@ -212,7 +219,14 @@ pub fn fleet(
         let how = DriftSettings { false_discoveries: settings.false_discoveries, ..DriftSettings::default() };
         changes = Some(drift(&fleet, &found, &how).map_err(told)?);
     }
+    let of_robot = |r: usize| match changes_of(changes.as_ref(), r) {
+        [] => Ok(None),
+        changed => found.robot_now(&fleet, r, changed),
+    };
+    let now =
+        (0..fleet.robots.len()).into_par_iter().map(of_robot).collect::<Result<_, _>>().map_err(told)?;
     Ok(FleetResult {
+        now,
         robot_outliers: found.robot_outliers(settings.false_discoveries),
         log_outliers: found.log_outliers(settings.false_discoveries),
         fit: found,
@@ -224,4 +238,19 @@ pub fn fleet(
         repeated,
         settings: settings.clone(),
     })
+}
+
+/// Changes of a robot, if it has any.
+fn changes_of(drift: Option<&Drift>, robot: usize) -> &[Change] {
+    match drift.map(|drift| &drift.robots[robot].history) {
+        Some(History::Changed { changes, .. }) => changes,
+        _ => &[],
+    }
+}
+
+impl FleetResult {
+    /// What is known of a robot with logs: as the fit has it, of one that has changed at its last log.
+    fn robot_fit(&self, robot: usize) -> Option<&RobotFit> {
+        self.now[robot].as_ref().or(self.fit.robots[robot].as_ref())
+    }
 }

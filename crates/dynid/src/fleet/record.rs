@@ -183,7 +183,7 @@ pub struct RobotRecord {
 pub struct RobotParameter {
     /// Name.
     pub name: String,
-    /// Value at the mean of the covariates.
+    /// Value at the mean of the covariates; of a robot that has changed, at its last log.
     pub value: f64,
     /// Interval of 95 %.
     pub interval: (f64, f64),
@@ -410,7 +410,7 @@ impl FleetResult {
         let of_event = self.drift.iter().flat_map(|d| &d.events).any(|e| e.robots.contains(&r));
         let spread = |k: usize| Some(fit.variances.robots[k].sqrt()).filter(|sd| *sd > 0.0);
         // Every robot of a fleet has a log.
-        let robot = fit.robots[r].as_ref();
+        let robot = self.robot_fit(r);
         let parameter = |k: usize| {
             let column = self.fleet.varying[k].column;
             let (value, sd) = robot.map_or((f64::NAN, f64::NAN), |x| {
@@ -521,7 +521,7 @@ impl FleetResult {
         let record = |(l, mut parameters): (usize, Vec<LogDeviation>)| {
             parameters.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
             let robot = self.built.robots[self.fleet.logs[l].robot].clone();
-            LogRecord { log: self.built.logs[l].clone(), robot, parameters }
+            LogRecord { log: self.built.facts[l].log.name.clone(), robot, parameters }
         };
         let mut out: Vec<LogRecord> = by_log.into_iter().map(record).collect();
         out.sort_by(|a, b| b.parameters[0].deviation.abs().total_cmp(&a.parameters[0].deviation.abs()));

@@ -93,6 +93,7 @@ impl Shown<'_> {
         report::Precision {
             variance_inflation: Some(record.variance_inflation),
             variance_inflation_per_joint: record.variance_inflation_per_joint.clone(),
+            basis: record.basis,
             blocks: Some(record.blocks as u64),
             block_s: Some(record.block_s),
             wanted_block_s: Some(record.wanted_block_s),
@@ -154,9 +155,8 @@ pub(super) fn held_out(estimate: &Estimate) -> report::HeldOut {
     let record = &estimate.held_out;
     report::HeldOut {
         folds: record.folds as u64,
-        joints: record
-            .rms
-            .iter()
+        // Robots that are held out tell of all joints together.
+        joints: (record.rms.iter().filter(|_| record.rms.iter().any(Option::is_some)))
             .zip(&record.rms_standard_error)
             .zip(&record.rms_consistent)
             .map(|((free, standard_error), consistent)| report::HeldOutJoint {
