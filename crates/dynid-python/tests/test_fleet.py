@@ -121,6 +121,14 @@ def test_a_fleet_is_that_of_the_program(prepared: Prepared) -> None:
     assert change["robot"] in found._repr_html_() and found.headline in repr(found)
     with pytest.raises(KeyError):
         found.robot_page("r999")
+    # Models of the type and of a robot, as the program writes them.
+    for name, file in ((None, "type.json"), (change["robot"], f"robots/{change['robot']}.json")):
+        estimate = found.estimate(name)
+        assert without_command(estimate.to_json()) == without_command((prepared.folder / "whole" / file).read_text())
+    names, covariance = estimate.covariance()
+    assert covariance.shape == (len(names), len(names)) and f"{change['parameter']}" in names
+    with pytest.raises(KeyError):
+        found.estimate("r999")
     fixed = dynid.fleet([prepared.folder / "factors"], between_robots=["fc"], covariates=[], threads=1)
     assert fixed.record["covariates"] == [] and "shoulder.fv" not in [p["name"] for p in fixed.parameters.rows() if p["between_robots"]]
     with pytest.raises(dynid.DynidError, match="fq"):

@@ -13,7 +13,7 @@ const SETTINGS: &str =
     "duration_s = 8\nrate_hz = 100\n[fleet]\nrobots = 12\nlogs = 12\nfaults = 1\nwear = 1\noutliers = 1\n";
 
 /// A fleet with its recipe and factors.
-fn prepared() -> &'static Path {
+pub(crate) fn prepared() -> &'static Path {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let make = || {
         let folder = tempfile::tempdir().unwrap();
@@ -81,6 +81,94 @@ fn what_was_put_in_is_found() {
     assert!(page.contains("Changes with time") && page.contains("12 robots"));
     let changed = truth["changes"][0]["robot"].as_str().unwrap();
     assert!(prepared().join(format!("whole/robots/{changed}.html")).is_file());
+}
+
+fn parameters(estimate: &Value) -> impl Iterator<Item = (&str, &Value)> {
+    estimate["parameters"].as_array().unwrap().iter().map(|p| (p["name"].as_str().unwrap(), p))
+}
+
+/// The type has the bodies that made the logs, and its files go where those of an identification go.
+#[test]
+fn the_model_of_the_type_is_exported() {
+    let at = prepared();
+    let of_type = read(&at.join("whole/type.json"));
+    let (base, fleet) = (of_type["base_parameters"].as_array().unwrap(), result("whole"));
+    for (own, known) in base.iter().zip(fleet["parameters"].as_array().unwrap()) {
+        assert_eq!((&own["name"], &own["std"]), (&known["name"], &known["sd"]), "one number in both files");
+        let (a, b) = (own["value"].as_f64().unwrap(), known["value"].as_f64().unwrap());
+        assert!((a - b).abs() < 0.05 * known["sd"].as_f64().unwrap(), "{own} {known}");
+    }
+    assert_eq!(of_type["precision"]["basis"], "robots");
+    assert_eq!(of_type["precision"]["blocks"], 12);
+    assert_eq!(of_type["feasible"], true);
+    run(at, &["export", "whole/type.json", "--urdf", "type.urdf", "--mjcf", "type.xml", "--quiet"], 0);
+    run(at, &["validate", "whole/type.json", "--log", "made/logs/r002-003.csv.gz", "--quiet"], 0);
+    let page = std::fs::read_to_string(at.join("whole/type.html")).unwrap();
+    assert!(page.contains("leaving out one robot at a time") && page.contains("144 logs of 12 robots"));
+}
+
+/// A recipe that was learned with a wrong robot file: the type has the bodies of the robots that made the logs.
+#[test]
+fn bodies_of_the_type_come_from_the_logs() {
+    let at = prepared();
+    let wrong = TWO_LINKS.replace("<mass value=\"1.5\"/>", "<mass value=\"2.1\"/>");
+    assert_ne!(wrong, TWO_LINKS);
+    std::fs::write(at.join("wrong.urdf"), wrong).unwrap();
+    let logs = ["--log", "made/logs/r001-001.csv.gz", "--log", "made/logs/r004-001.csv.gz"];
+    run(at, &[&["reduce", "wrong.urdf", "--out", "wrong.factors", "--quiet"], &logs[..]].concat(), 0);
+    run(at, &["reduce", "wrong.factors", "--manifest", "made/manifest.csv", "--out", "bent", "--quiet"], 0);
+    run(at, &["fleet", "bent", "--out", "mended", "--quiet"], 0);
+    // The robot file that made the logs is what the other fleet knew beforehand.
+    let (found, truth) = (read(&at.join("mended/type.json")), read(&at.join("whole/type.json")));
+    let (mut seen, mut moved) = (0, 0);
+    for ((name, own), (_, true_one)) in parameters(&found).zip(parameters(&truth)) {
+        let Some(interval) = own["interval"].as_array().filter(|_| own["link"].is_string()) else { continue };
+        let (low, high) = (interval[0].as_f64().unwrap(), interval[1].as_f64().unwrap());
+        let (expected, wrong) = (true_one["prior"].as_f64().unwrap(), own["prior"].as_f64().unwrap());
+        let margin = high - low;
+        assert!((low - margin..high + margin).contains(&expected), "{name}: {expected} in {low} to {high}");
+        seen += 1;
+        moved += usize::from(!(low..high).contains(&wrong));
+    }
+    assert!(seen >= 3 && moved >= 1, "{seen} {moved}");
+}
+
+/// A robot has the bodies of its type and friction of its own; one that has changed is what it is now.
+#[test]
+fn models_of_robots_are_those_of_today() {
+    let at = prepared();
+    let (of_type, truth) = (read(&at.join("whole/type.json")), read(&at.join("made/truth.json")));
+    let logs = truth["logs"].as_array().unwrap();
+    for change in truth["changes"].as_array().unwrap() {
+        let name = change["robot"].as_str().unwrap();
+        let robot = read(&at.join(format!("whole/robots/{name}.json")));
+        for ((parameter, own), (_, shared)) in parameters(&robot).zip(parameters(&of_type)) {
+            let (a, b) = (own["value"].as_f64().unwrap(), shared["value"].as_f64().unwrap());
+            if own["link"].is_string() || parameter.ends_with(".Ia") {
+                assert!((a - b).abs() <= 5e-3 * b.abs() + 1e-4, "{name} {parameter}: {a} {b}");
+            }
+        }
+        let parameter = change["parameter"].as_str().unwrap();
+        let (_, now) = parameters(&robot).find(|(p, _)| *p == parameter).unwrap();
+        let of_robot = || logs.iter().filter(|l| l["robot"] == name);
+        let start = |l: &Value| l["start_s"].as_f64().unwrap();
+        let last = of_robot().max_by(|a, b| start(a).total_cmp(&start(b))).unwrap();
+        // Scatter between logs is beside it: less than a tenth of the parameter.
+        let (found, of_last) =
+            (now["value"].as_f64().unwrap(), last["parameters"][parameter].as_f64().unwrap());
+        let first = of_robot().min_by(|a, b| start(a).total_cmp(&start(b))).unwrap();
+        let before = first["parameters"][parameter].as_f64().unwrap();
+        assert!((found - of_last).abs() < 0.5 * (before - of_last).abs(), "{found} {of_last} {before}");
+        let told = robot["verdict"]["cautions"].to_string();
+        assert!(told.contains("has changed by") && told.contains("at the last log"), "{told}");
+        let known = result("whole");
+        let record = known["robots"].as_array().unwrap().iter().find(|r| r["name"] == name).unwrap();
+        let in_fleet = record["parameters"].as_array().unwrap().iter().find(|p| p["name"] == parameter);
+        let value = in_fleet.unwrap()["value"].as_f64().unwrap();
+        assert!((value - found).abs() < 0.3 * now["std"].as_f64().unwrap(), "{value} {found}");
+        assert_eq!(robot["precision"]["basis"], "fleet");
+        run(at, &["export", &format!("whole/robots/{name}.json"), "--model", "robot.json", "--quiet"], 0);
+    }
 }
 
 /// Who bears more false alarms is told of more robots.

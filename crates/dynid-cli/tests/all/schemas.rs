@@ -7,7 +7,7 @@ use std::path::Path;
 use dynid::schema::all;
 use serde_json::Value;
 
-use crate::support::run;
+use crate::{fleet, support::run};
 
 /// Faults of a value against a schema: types, keys that are missing or that the schema does not know, values of lists and choices.
 struct Checker<'a> {
@@ -125,7 +125,16 @@ fn results_keep_to_their_schemas() {
     let read = |name: &str| serde_json::from_slice::<Value>(&std::fs::read(at.join(name)).unwrap()).unwrap();
     let printed = |args: &[&str]| serde_json::from_slice::<Value>(&run(at, args, 0).stdout).unwrap();
     let (cell, solved) = ("out/estimate.json", "solved/estimate.json");
+    let fleet = fleet::prepared().join("whole");
+    let of_fleet =
+        |name: &Path| serde_json::from_slice::<Value>(&std::fs::read(fleet.join(name)).unwrap()).unwrap();
+    let robot_of_fleet = std::fs::read_dir(fleet.join("robots")).unwrap().map(|file| file.unwrap().path());
+    let robot_of_fleet =
+        robot_of_fleet.min_by_key(|path| (path.extension() != Some("json".as_ref()), path.clone()));
     let results = [
+        ("fleet", of_fleet("fleet.json".as_ref())),
+        ("estimate", of_fleet("type.json".as_ref())),
+        ("estimate", of_fleet(&robot_of_fleet.unwrap())),
         ("estimate", read(cell)),
         ("estimate", read(solved)),
         ("model", read("model.json")),

@@ -193,5 +193,8 @@ fn nothing_changes_without_changes() {
     }
     let ramp = fit.robot_now(&fleet, 1, &[step(0.5, 0.0, false)]).expect("fits").expect("has logs");
     let known = fit.robots[1].as_ref().expect("has logs");
-    assert!(ramp.covariance[(1, 1)] > 2.0 * known.covariance[(1, 1)], "a ramp that may be there widens today");
+    assert!(
+        ramp.covariance[(1, 1)] > 2.0 * known.covariance[(1, 1)],
+        "a ramp that may be there widens today"
+    );
 }
