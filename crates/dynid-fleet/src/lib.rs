@@ -11,7 +11,7 @@
 //! | what each robot says of the type, for any estimator | [`FleetFit::said_by_robots`] |
 //! | robots and logs out of the spread | [`FleetFit::robot_outliers`], [`FleetFit::log_outliers`] |
 //! | changes with dates | [`drift()`](drift::drift) |
-//! | a robot that has changed, as it is now | [`FleetFit::robot_now`] |
+//! | robots that have changed, as they are now | [`FleetFit::robots_now`] |
 //! | parts merged to the same bits in any order | [`tree`] |
 //!
 //! The result depends on the set of logs only: not on their order, nor on the number of threads.

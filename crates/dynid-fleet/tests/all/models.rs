@@ -2,7 +2,7 @@
 
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_fleet::drift::{Change, Kind};
-use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetLog, Noise, Variances, fit_at};
+use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetFit, FleetLog, Noise, RobotFit, Variances, fit_at};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -129,11 +129,15 @@ fn silent_channels_tell_nothing() {
     let (noise, variances) = truth_of(&fleet);
     let fit = fit_at(&fleet, noise, variances).expect("fits");
     let without = fit.without(&fleet, &[false, true]).expect("fits");
-    let sd = |fit: &dynid_fleet::FleetFit, c: usize| fit.covariance[(c, c)].sqrt();
+    let sd = |fit: &FleetFit, c: usize| fit.covariance[(c, c)].sqrt();
     assert!(sd(&without, 4) > 1e4 * sd(&fit, 4), "column 4 acts on the silent channel alone");
     assert!(sd(&without, 0) < 1.5 * sd(&fit, 0));
     let all = fit.without(&fleet, &[false, false]).expect("fits");
     assert_eq!(all.values, fit.values);
+}
+
+fn now_of(fit: &FleetFit, fleet: &Fleet, robot: usize, changes: &[Change]) -> RobotFit {
+    fit.robots_now(fleet, &[(robot, changes)]).expect("fits").remove(0).expect("has logs")
 }
 
 fn step(size: f64, time_s: f64, step: bool) -> Change {
@@ -160,7 +164,7 @@ fn a_robot_that_has_changed_is_what_it_is_now() {
         let Made { fleet, now } = made(100 + seed, 2.0);
         let (noise, variances) = truth_of(&fleet);
         let fit = fit_at(&fleet, noise, variances).expect("fits");
-        let robot = fit.robot_now(&fleet, 0, &[step(2.0, 3.5, true)]).expect("fits").expect("has logs");
+        let robot = now_of(&fit, &fleet, 0, &[step(2.0, 3.5, true)]);
         let before = fit.robots[0].as_ref().expect("has logs");
         for column in [1, 3] {
             let sd = robot.covariance[(column, column)].sqrt();
@@ -181,7 +185,7 @@ fn nothing_changes_without_changes() {
     let (noise, variances) = truth_of(&fleet);
     let fit = fit_at(&fleet, noise, variances).expect("fits");
     for r in 0..ROBOTS {
-        let now = fit.robot_now(&fleet, r, &[]).expect("fits").expect("has logs");
+        let now = now_of(&fit, &fleet, r, &[]);
         let known = fit.robots[r].as_ref().expect("has logs");
         for i in 0..COLUMNS {
             assert!((now.values[i] - known.values[i]).abs() < 1e-10);
@@ -191,7 +195,10 @@ fn nothing_changes_without_changes() {
             }
         }
     }
-    let ramp = fit.robot_now(&fleet, 1, &[step(0.5, 0.0, false)]).expect("fits").expect("has logs");
+    let (at_once, some_day) = (step(0.5, 3.5, true), Change { from_s: 1.5, to_s: 5.5, ..step(0.5, 3.5, true) });
+    let sd = |change: Change| now_of(&fit, &fleet, 1, &[change]).covariance[(1, 1)].sqrt();
+    assert!(sd(some_day) > 1.05 * sd(at_once), "a date that is not known leaves more open");
+    let ramp = now_of(&fit, &fleet, 1, &[step(0.5, 0.0, false)]);
     let known = fit.robots[1].as_ref().expect("has logs");
     assert!(
         ramp.covariance[(1, 1)] > 2.0 * known.covariance[(1, 1)],

@@ -18,7 +18,6 @@ use std::path::PathBuf;
 
 use dynid_fleet::drift::{Change, Drift, DriftSettings, History, drift};
 use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, RobotFit, fit};
-use rayon::prelude::*;
 
 pub use dynid_identify::reduction::Origin;
 
@@ -219,12 +218,14 @@ pub fn fleet(
         let how = DriftSettings { false_discoveries: settings.false_discoveries, ..DriftSettings::default() };
         changes = Some(drift(&fleet, &found, &how).map_err(told)?);
     }
-    let of_robot = |r: usize| match changes_of(changes.as_ref(), r) {
-        [] => Ok(None),
-        changed => found.robot_now(&fleet, r, changed),
-    };
-    let now =
-        (0..fleet.robots.len()).into_par_iter().map(of_robot).collect::<Result<_, _>>().map_err(told)?;
+    let changed: Vec<(usize, &[Change])> = (0..fleet.robots.len())
+        .map(|r| (r, changes_of(changes.as_ref(), r)))
+        .filter(|(_, of_robot)| !of_robot.is_empty())
+        .collect();
+    let mut now = vec![None; fleet.robots.len()];
+    for ((r, _), fit) in changed.iter().zip(found.robots_now(&fleet, &changed).map_err(told)?) {
+        now[*r] = fit;
+    }
     Ok(FleetResult {
         now,
         robot_outliers: found.robot_outliers(settings.false_discoveries),

@@ -74,7 +74,7 @@ impl FleetResult {
         let without = match self.without_unexplained(&pooled)? {
             Some(fit) => {
                 let changes = changes_of(self.drift.as_ref(), r);
-                fit.robot_now(&self.fleet, r, changes).map_err(|error| self.fault(error))?
+                fit.robots_now(&self.fleet, &[(r, changes)]).map_err(|error| self.fault(error))?.remove(0)
             }
             None => None,
         };
