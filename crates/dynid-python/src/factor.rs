@@ -19,11 +19,17 @@ pub(crate) struct Factor {
 impl Factor {
     /// Reduces logs by the choices of an identification.
     #[staticmethod]
-    fn of(py: Python<'_>, estimate: PyRef<'_, Estimate>, logs: Vec<PyRef<'_, Log>>) -> PyResult<Self> {
+    fn of(
+        py: Python<'_>,
+        estimate: PyRef<'_, Estimate>,
+        logs: Vec<PyRef<'_, Log>>,
+        delays: bool,
+    ) -> PyResult<Self> {
         let found = estimate.found(py, "reduce")?.clone();
         let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
         let reduction = crate::work::run(py, None, 0, move |_| {
-            let reducer = found.recipe()?.reducer()?;
+            let recipe = found.recipe()?;
+            let reducer = if delays { recipe.with_delays() } else { recipe }.reducer()?;
             let logs =
                 logs.iter().map(|log| log.of(&reducer.robot().axes, false)).collect::<Result<Vec<_>, _>>()?;
             Reduction::of(&reducer, logs)

@@ -25,14 +25,16 @@ pub struct Learned {
     pub estimate: Estimate,
 }
 
-/// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it.
+/// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it. `delays`: whether factors get
+/// columns for the rest of delays ([`Recipe::with_delays`]).
 ///
 /// # Errors
 /// As [`crate::identify()`], [`Identification::recipe`] and [`Reducer::reduce`].
-pub fn learn(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
+pub fn learn(config: &Config, delays: bool, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
     let run = identify(config, progress)?;
     let reading = ReadingRecord { understood: Vec::new(), ..run.reading.clone() };
     let recipe = run.recipe()?.with_reading(reading);
+    let recipe = if delays { recipe.with_delays() } else { recipe };
     let estimate = run.estimate();
     // Samples go before they are read once more.
     drop(run);

@@ -33,6 +33,10 @@ pub(crate) struct ReduceArgs {
     /// Every N-th log of the manifest, from the K-th on, for N processes that share the folder.
     #[arg(long, value_name = "K/N", value_parser = shard, requires = "manifest")]
     pub(crate) shard: Option<(usize, usize)>,
+    /// Where a recipe is learned: give factors a column per effort for the rest of its delay, log by log, so that a fleet sees how delays differ
+    /// and change.
+    #[arg(long, conflicts_with = "manifest")]
+    pub(crate) delays: bool,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
     #[command(flatten)]

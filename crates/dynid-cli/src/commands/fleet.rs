@@ -144,6 +144,12 @@ fn file_name(robot: &str) -> String {
     robot.chars().map(kept).collect()
 }
 
+/// A change with two digits of its standard deviation, three decimals at least.
+fn with_deviation(size: f64, sd: f64) -> String {
+    let decimals = if sd > 0.0 { (1.0 - sd.log10().floor()).clamp(3.0, 9.0) as usize } else { 3 };
+    format!("{size:+.decimals$} ± {sd:.decimals$}")
+}
+
 fn summary(file: &FleetFile) -> String {
     let changed: Vec<(&RobotRecord, &ChangeRecord)> =
         file.robots.iter().flat_map(|r| r.changes.iter().map(move |c| (r, c))).collect();
@@ -154,7 +160,7 @@ fn summary(file: &FleetFile) -> String {
                 r.name.clone(),
                 c.parameter.clone(),
                 c.kind.to_string(),
-                format!("{:+.3} ± {:.3}", c.size, c.sd),
+                with_deviation(c.size, c.sd),
                 c.date.text.clone(),
                 format!("{:.0e}", c.p),
             ]

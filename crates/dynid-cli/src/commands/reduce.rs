@@ -32,6 +32,15 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
             "`dynid merge` and `dynid solve` take factor files alone",
         ));
     }
+    if args.delays && follows {
+        return Err(Failure::Usage(
+            format!(
+                "--delays: expected a robot file or a configuration, found the recipe of {}",
+                args.input.display()
+            ),
+            "a recipe has the columns that it was learned with: learn it with `--delays`",
+        ));
+    }
     if let Some(config) = args.reading.config.as_ref().filter(|_| !follows) {
         return Err(Failure::Usage(
             format!(
@@ -56,7 +65,8 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
         let logs = GivenLogs { paths: &args.log, rows: args.reading.rows };
         let mut config: Config = configuration(&args.input, &logs, notes)?;
         apply_log_args_to(&mut config, &args.reading.columns);
-        let Learned { reduction, estimate } = reduce::learn(&config, &mut |step| progress.step(step))?;
+        let Learned { reduction, estimate } =
+            reduce::learn(&config, args.delays, &mut |step| progress.step(step))?;
         (reduction, Some(estimate.verdict))
     };
     drop(progress);
@@ -143,14 +153,14 @@ fn written(
             })
             .collect();
         json(&json!({
-            "robot": recipe.robot, "recipe": recipe.hash(), "columns": recipe.columns, "choices": recipe.choices,
+            "robot": recipe.robot, "recipe": recipe.hash(), "columns": recipe.all_columns(), "choices": recipe.choices,
             "logs": logs, "verdict": verdict,
         }))?;
     } else {
         let mut out = format!(
             "{}: {} columns, kernel {:.2} Hz, recipe {}\n",
             recipe.robot,
-            recipe.columns.len(),
+            recipe.all_columns().len(),
             recipe.choices.kernel_hz,
             &recipe.hash()[..12]
         );

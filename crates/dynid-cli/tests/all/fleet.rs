@@ -171,6 +171,58 @@ fn models_of_robots_are_those_of_today() {
     }
 }
 
+/// A delay that grows in one robot is found where factors have columns for it, and friction is not blamed for it.
+#[test]
+fn delays_that_change_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("arm.urdf"), TWO_LINKS).unwrap();
+    let settings = "duration_s = 8\nrate_hz = 100\n[fleet]\nrobots = 12\nlogs = 12\nwear = 1\ndelays = 4\n";
+    std::fs::write(at.join("fleet.toml"), settings).unwrap();
+    run(
+        at,
+        &["simulate", "arm.urdf", "--config", "fleet.toml", "--seed", "9", "--out", "made", "--quiet"],
+        0,
+    );
+    let logs = ["--log", "made/logs/r001-001.csv.gz", "--log", "made/logs/r004-001.csv.gz"];
+    let learn = ["reduce", "arm.urdf", "--delays", "--out", "type.factors", "--quiet"];
+    run(at, &[&learn[..], &logs[..]].concat(), 0);
+    run(at, &["reduce", "type.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"], 0);
+    run(at, &["fleet", "factors", "--out", "whole", "--quiet"], 0);
+    let (found, truth) = (read(&at.join("whole/fleet.json")), read(&at.join("made/truth.json")));
+    let robots = found["robots"].as_array().unwrap();
+    let mut told = 0;
+    for change in truth["changes"].as_array().unwrap() {
+        let robot = robots.iter().find(|r| r["name"] == change["robot"]).unwrap();
+        let put_in = change["size"].as_f64().unwrap();
+        let own = robot["parameters"].as_array().unwrap().iter().find(|p| p["name"] == change["parameter"]);
+        // What is too small for the logs is said to be.
+        if own.unwrap()["detectable"].as_f64().unwrap() > put_in.abs() {
+            continue;
+        }
+        let found = &robot["changes"][0];
+        assert_eq!(found["parameter"], change["parameter"], "{robot}");
+        let (size, sd) = (found["size"].as_f64().unwrap(), found["sd"].as_f64().unwrap());
+        assert!((size - put_in).abs() < 4.0 * sd, "{found} {change}");
+        told += usize::from(change["parameter"].as_str().unwrap().ends_with(".delay"));
+    }
+    assert!(told > 0, "{}", truth["changes"]);
+    for robot in robots.iter().filter(|r| r["changes"] != Value::Array(Vec::new())) {
+        let put_in = truth["changes"].as_array().unwrap().iter().any(|c| c["robot"] == robot["name"]);
+        assert!(put_in, "{robot}");
+    }
+    // A delay is no parameter of a robot file.
+    let of_type = read(&at.join("whole/type.json"));
+    assert!(parameters(&of_type).all(|(name, _)| !name.ends_with(".delay")));
+    assert!(found["parameters"].to_string().contains("shoulder.delay"));
+    run(at, &["export", "whole/type.json", "--urdf", "type.urdf", "--quiet"], 0);
+    run(at, &["solve", "type.factors", "--out", "solved", "--quiet"], 0);
+    let refused =
+        ["reduce", "type.factors", "--delays", "--log", "made/logs/r001-001.csv.gz", "--out", "x.factors"];
+    let output = run(at, &refused, 2);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("learn it with `--delays`"));
+}
+
 /// Who bears more false alarms is told of more robots.
 #[test]
 fn the_rate_of_false_discoveries_decides_who_is_named() {

@@ -104,6 +104,31 @@ proptest! {
         prop_assert!((whole.centred(&rows.x).rss(&origin) - loss).abs() <= tolerance);
     }
 
+    /// The loss where a parameter is free is the least over it.
+    #[test]
+    fn a_freed_column_has_the_value_that_fits_best(rows in rows(), at in 0.0..1.0_f64) {
+        let column = ((at * rows.columns as f64) as usize).min(rows.columns - 1);
+        let whole = rows.factor(0..rows.y.len(), 16);
+        let freed = whole.freed_of(&[column]);
+        let (size, norms) = rows.sizes();
+        let mut rest = rows.x.clone();
+        rest.remove(column);
+        let without = Rows { x: (0..rows.columns).map(|c| if c == column { 0.0 } else { rows.x[c] }).collect(), ..rows.clone() };
+        let residuals = without.residuals();
+        let loss: f64 = residuals.iter().map(|r| r * r).sum();
+        let along: f64 = rows.w.iter().zip(&residuals).map(|(row, r)| row[column] * r).sum();
+        let norm = norms[column];
+        let (found, tolerance) = (freed.rss(&rest), 1e-10 * size * size);
+        if norm > 0.0 {
+            let least = loss - (along / norm).powi(2);
+            prop_assert!((found - least).abs() <= tolerance, "{} {}", found, least);
+        } else {
+            prop_assert!(found <= loss + tolerance);
+        }
+        prop_assert_eq!(freed.columns(), rows.columns - 1);
+        prop_assert_eq!(freed.rows(), rows.y.len() - 1);
+    }
+
     #[test]
     fn least_squares_leaves_no_gradient_whatever_the_rank(rows in rows()) {
         let factor = rows.factor(0..rows.y.len(), 16);

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use dynid_identify::Error;
+use dynid_identify::reduction::DELAY;
 use dynid_identify::robot::Robot;
+use dynid_motion::shift::shift;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -21,6 +23,8 @@ const FIRST_DAY: f64 = 1_767_225_600.0;
 const TEMPERATURE: f64 = 25.0;
 /// Deviation of a robot that stands out, in standard deviations of its fleet.
 const OUTLIER: f64 = 8.0;
+/// Spread of delays between robots and between logs, samples.
+const DELAY_SPREAD: (f64, f64) = (0.1, 0.03);
 /// Deviation of a broken log, in standard deviations of its robot's logs.
 const BROKEN: f64 = 15.0;
 
@@ -179,6 +183,13 @@ impl VirtualFleet {
                 date_s: FIRST_DAY + DAY * table.days * at,
             });
         }
+        for _ in 0..if joints.is_empty() { 0 } else { table.delays } {
+            let robot = name(take(&mut rng));
+            let parameter = format!("{}.{DELAY}", joints[rng.random_range(0..joints.len())]);
+            let size = rng.random_range(0.3..1.0) / self.settings.rate_hz;
+            let date_s = FIRST_DAY + DAY * table.days * rng.random_range(0.25..0.75);
+            self.changes.push(PlannedChange { robot, parameter, kind: "step", size, date_s });
+        }
         for r in 0..table.robots {
             let odd =
                 outliers.iter().find(|(robot, _)| *robot == r).map(|(_, joint)| joints[*joint].as_str());
@@ -227,7 +238,15 @@ impl VirtualFleet {
         let hit = rng.random_range(0.0..1.0) < self.table.broken && !joints.is_empty();
         let broken = hit.then(|| joints[rng.random_range(0..joints.len())].clone());
         let mut parameters = self.robots[r].clone();
-        for (parameter, _) in &self.nominal {
+        let mut delays: Vec<(String, f64)> = Vec::new();
+        for joint in joints.iter().filter(|_| self.table.delays > 0) {
+            let sample = 1.0 / self.settings.rate_hz;
+            let of_robot = DELAY_SPREAD.0 * sample * normal(&mut self.rng(&format!("delay {r} {joint}")));
+            let of_log = DELAY_SPREAD.1 * sample * normal(&mut self.rng(&format!("delay {r} {l} {joint}")));
+            delays.push((format!("{joint}.{DELAY}"), of_robot));
+            parameters.insert(format!("{joint}.{DELAY}"), of_robot + of_log);
+        }
+        for (parameter, _) in self.nominal.iter().chain(&delays) {
             let (joint, symbol) = parts(parameter);
             let size = self.size(parameter);
             let mut change = 0.0;
@@ -274,7 +293,20 @@ impl VirtualFleet {
         let VirtualLog { parameters, .. } = self.about(index);
         let seed = self.rng(&format!("motion {index}")).random();
         let mut values = self.settings.values.clone();
-        values.extend(parameters);
-        simulate(robot, &SimulateSettings { values, seed, fleet: None, ..self.settings.clone() })
+        let is_delay = |parameter: &String| parts(parameter).1 == DELAY;
+        values.extend(parameters.iter().filter(|(p, _)| !is_delay(p)).map(|(p, v)| (p.clone(), *v)));
+        let settings = SimulateSettings { values, seed, fleet: None, ..self.settings.clone() };
+        let mut log = simulate(robot, &settings)?;
+        for (parameter, delay) in parameters.iter().filter(|(p, _)| is_delay(p)) {
+            let joint = log.joints.iter().position(|joint| joint == parts(parameter).0);
+            if let Some(effort) = joint.map(|j| &mut log.effort[j]) {
+                // The effort runs ahead of the motion.
+                let Ok(led) = shift(effort, delay * self.settings.rate_hz) else {
+                    unreachable!("simulated efforts are finite")
+                };
+                *effort = led.values;
+            }
+        }
+        Ok(log)
     }
 }

@@ -32,6 +32,9 @@ pub struct FleetTable {
     pub wear: usize,
     /// Robots with a step of 20 to 40 % of Coulomb friction, in it or the offset of a joint. Default 0.
     pub faults: usize,
+    /// Robots in which the delay of the motion behind the effort of a joint grows at once by 0.3 to 1 samples. The delays of all joints then differ
+    /// by 0.1 samples between robots, and by 0.03 between logs. Default 0.
+    pub delays: usize,
     /// Share of the logs in which one joint is off by 15 standard deviations. Default 0.
     pub broken: f64,
 }
@@ -50,6 +53,7 @@ impl Default for FleetTable {
             outliers: 0,
             wear: 0,
             faults: 0,
+            delays: 0,
             broken: 0.0,
         }
     }
@@ -57,14 +61,14 @@ impl Default for FleetTable {
 
 impl FleetTable {
     pub(super) fn check(&self) -> Result<(), Error> {
-        let special = self.outliers + self.wear + self.faults;
+        let special = self.outliers + self.wear + self.faults + self.delays;
         let counts = [
             ("fleet.robots", self.robots >= 1, "at least 1", self.robots),
             ("fleet.logs", self.logs >= 1, "at least 1", self.logs),
             (
                 "fleet.outliers",
                 special <= self.robots,
-                "as many robots as outliers, wear and faults need",
+                "as many robots as outliers, wear, faults and delays need",
                 special,
             ),
         ];

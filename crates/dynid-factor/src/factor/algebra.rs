@@ -43,6 +43,24 @@ impl Factor {
         self.with_remainder(builder)
     }
 
+    /// What is left of other columns where the parameters of the chosen ones are free: `[W y]` projected off these columns, as many rows fewer (a column of zeros
+    /// costs a row too).
+    ///
+    /// Panics if an index is not below `p`, or is there twice.
+    #[must_use]
+    pub fn freed_of(&self, columns: &[usize]) -> Factor {
+        let n = columns.len();
+        let rest: Vec<usize> = (0..self.columns).filter(|c| !columns.contains(c)).collect();
+        assert_eq!(rest.len() + n, self.columns, "columns that are there, each once");
+        let first: Vec<usize> = columns.iter().chain(&rest).copied().collect();
+        let ordered = self.select(&first);
+        let mut builder = FactorBuilder::with_chunk_rows(rest.len(), ordered.height().saturating_sub(n));
+        builder.stack(ordered.height().saturating_sub(n), |i, j| ordered.triangle[(n + i, n + j)]);
+        let mut out = ordered.with_remainder(builder);
+        out.rows = self.rows.saturating_sub(n);
+        out
+    }
+
     /// Factor in a larger set of `total` columns: column `c` goes to `positions[c]`, all others are zero.
     ///
     /// Panics unless `positions` holds one distinct index below `total` per column.

@@ -195,7 +195,8 @@ fn nothing_changes_without_changes() {
             }
         }
     }
-    let (at_once, some_day) = (step(0.5, 3.5, true), Change { from_s: 1.5, to_s: 5.5, ..step(0.5, 3.5, true) });
+    let (at_once, some_day) =
+        (step(0.5, 3.5, true), Change { from_s: 1.5, to_s: 5.5, ..step(0.5, 3.5, true) });
     let sd = |change: Change| now_of(&fit, &fleet, 1, &[change]).covariance[(1, 1)].sqrt();
     assert!(sd(some_day) > 1.05 * sd(at_once), "a date that is not known leaves more open");
     let ramp = now_of(&fit, &fleet, 1, &[step(0.5, 0.0, false)]);

@@ -171,7 +171,7 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         .or(known.map(|(recipe, _)| recipe))
         .ok_or_else(|| Fault::Description(beside.to_owned()))?;
     let (outputs, scales) = (by.outputs.len(), by.choices.scales_hz.len());
-    let columns = by.columns.len();
+    let columns = by.all_columns().len();
     let mut out: Vec<ReducedLog> = Vec::new();
     for LogEntry { key: expected, facts, bytes, sha256 } in logs {
         let (own, others) = factors.split_at(bytes as usize);

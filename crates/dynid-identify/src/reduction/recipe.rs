@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
-use dynid_model::{EffortModel, Parameter, RobotModel};
+use dynid_model::{EffortModel, Owner, Parameter, RobotModel};
 use dynid_motion::cutoff::KernelLimit;
 use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,9 @@ use crate::shape::{self, ShapeFit};
 use crate::structure::Structure;
 use crate::training_log::TrainingLog;
 use crate::verdict::{self, Status};
+
+/// Symbol of the rest of a delay.
+pub const DELAY: &str = "delay";
 
 /// What decides the rows of a log, and how factors of such rows are solved.
 ///
@@ -66,6 +69,9 @@ pub struct Recipe {
     pub inputs: Vec<InputRecord>,
     /// How logs are read.
     pub reading: ReadingRecord,
+    /// Whether factors have a column per output for the rest of its delay, behind the others.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    delays: bool,
     /// Checks of the identification behind it that did not pass and that factors cannot repeat.
     pub doubts: Vec<CheckResult>,
 }
@@ -284,6 +290,7 @@ impl Identification {
                 )
                 .collect(),
             reading: ReadingRecord::default(),
+            delays: false,
             doubts: doubts(self),
             model,
         })
@@ -320,14 +327,48 @@ impl Recipe {
         dynid_files::digest::sha256(plain(&without_paths).as_bytes())
     }
 
-    /// Per column the standard parameter that stands for it.
+    /// Returns the recipe with a column per output for the rest of its delay, log by log: a fleet then sees how delays differ and change, and a
+    /// solution no longer rests on the one delay of the recipe.
+    #[must_use]
+    pub fn with_delays(self) -> Self {
+        Recipe { delays: true, ..self }
+    }
+
+    /// Whether factors have columns for the rest of delays.
+    pub fn has_delays(&self) -> bool {
+        self.delays
+    }
+
+    /// Columns of factors: [`Recipe::columns`], and where they have them those of the rest of delays, a sample in size.
+    pub fn all_columns(&self) -> Vec<Column> {
+        let delay = |output: &Output| Column {
+            name: format!("{}.{DELAY}", output.name),
+            unit: "s".to_owned(),
+            scale: 1.0 / self.choices.rate_hz,
+        };
+        let delays = self.outputs.iter().filter(|_| self.delays).map(delay);
+        self.columns.iter().cloned().chain(delays).collect()
+    }
+
+    /// Per column of factors ([`Recipe::all_columns`]) the parameter that stands for it.
     ///
     /// # Errors
     /// [`ReductionError::Contradiction`].
     pub fn parameters(&self) -> Result<Vec<Parameter>, Error> {
         let (problem, _) = self.problem()?;
         let table = &problem.model.parameters().linear;
-        Ok(problem.structure.base.kept.iter().map(|c| table[*c].clone()).collect())
+        let delay = |(k, output): (usize, &Output)| Parameter {
+            name: format!("{}.{DELAY}", output.name),
+            symbol: format!("{DELAY}{}", k + 1),
+            unit: "s",
+            owner: Owner::Joint(output.name.clone()),
+            prior: None,
+            lower: None,
+            upper: None,
+            fold_first: false,
+        };
+        let delays = self.outputs.iter().enumerate().filter(|_| self.delays).map(delay);
+        Ok(problem.structure.base.kept.iter().map(|c| table[*c].clone()).chain(delays).collect())
     }
 
     /// Returns the recipe with how its logs were read, for other logs to be read alike.

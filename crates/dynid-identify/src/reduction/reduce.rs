@@ -121,6 +121,7 @@ impl Reducer {
         let Problem { model, structure, .. } = &self.problem;
         let logs = std::slice::from_ref(&prepared);
         let rows = LogRows::new(model, &structure.shape, &structure.base.kept, logs, &choices, &conditioned)?;
+        let rows = if self.recipe.has_delays() { rows.with_delay_columns()? } else { rows };
         let (groups, efforts) = reduced(&rows, self.recipe.outputs.len(), self.recipe.blocks.merged)?;
         drop(rows);
         let rest = Rest { groups, efforts, trained: TrainedLog::of(&prepared) };

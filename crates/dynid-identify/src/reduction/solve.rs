@@ -5,7 +5,7 @@ use dynid_estimate::metrics::{ChannelSums, FitSums};
 use dynid_factor::groups::ReducedGroup;
 
 use super::recipe::{Solved, training_log};
-use super::{LogFacts, Recipe, Reduction, ReductionError};
+use super::{LogFacts, Recipe, ReducedLog, Reduction, ReductionError};
 use crate::Error;
 use crate::consistency::{self, Consistent};
 use crate::finding::Finding;
@@ -40,9 +40,11 @@ impl Reduction {
         problem.training = self.logs.iter().map(|log| training_log(&log.facts.name)).collect();
         problem.settings.files.robot.clone_from(&problem.robot.path);
         let columns = problem.structure.base.len();
-        let groups: Vec<ReducedGroup> = (self.logs.iter().enumerate())
-            .flat_map(|(k, log)| log.groups.iter().map(move |g| ReducedGroup { log: k, ..g.clone() }))
-            .collect();
+        let of_log = |(k, log): (usize, &ReducedLog)| -> Vec<ReducedGroup> {
+            log.groups.iter().map(|g| ReducedGroup { log: k, ..without_delay(g, columns) }).collect()
+        };
+        let of_logs: Vec<Vec<ReducedGroup>> = self.logs.iter().enumerate().map(of_log).collect();
+        let groups: Vec<ReducedGroup> = of_logs.iter().flatten().cloned().collect();
         progress(Step::Fit);
         fitting::check_rows(&groups, columns, || self.logs[0].facts.name.clone())?;
         let settings = fitting::linear_settings(&problem.settings);
@@ -52,8 +54,8 @@ impl Reduction {
         progress(Step::Consistency);
         let consistent = consistency::consistent(&problem, &fitted, &groups)?;
         let base = problem.structure.base.values(&consistent.values);
-        let row_fits: Vec<RowFit> = (self.logs.iter())
-            .map(|log| row_fit(&log.facts, &log.groups, &base, self.recipe.outputs.len()))
+        let row_fits: Vec<RowFit> = (self.logs.iter().zip(&of_logs))
+            .map(|(log, groups)| row_fit(&log.facts, groups, &base, self.recipe.outputs.len()))
             .collect();
         let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
         let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
@@ -129,6 +131,15 @@ impl Recipe {
         out.row_fits = row_fits;
         Ok((out, left))
     }
+}
+
+/// The rows of a group where the rest of the delay is free, time block by time block; `columns`: those of the model, behind which its column is.
+fn without_delay(group: &ReducedGroup, columns: usize) -> ReducedGroup {
+    let Some(at) = group.columns.iter().position(|c| *c >= columns) else { return group.clone() };
+    let mut kept = group.columns.clone();
+    kept.remove(at);
+    let blocks = group.blocks.iter().map(|block| block.freed_of(&[at])).collect();
+    ReducedGroup { columns: kept, blocks, ..*group }
 }
 
 /// How well the rows of a log are explained by values in base columns.

@@ -239,6 +239,8 @@ struct Pass<'a> {
     figures: &'a RecordFigures,
     most_blocks: usize,
     merged: usize,
+    /// Whether rows have columns for the rest of delays.
+    delays: bool,
     outputs: usize,
     blocks: Vec<(GroupShape, Blocks)>,
     trained: TrainedLog,
@@ -264,6 +266,7 @@ impl<'a> Pass<'a> {
             figures,
             most_blocks: reducer.recipe.blocks.most.max(1),
             merged: reducer.recipe.blocks.merged,
+            delays: reducer.recipe.has_delays(),
             outputs: reducer.recipe.outputs.len(),
             blocks: Vec::new(),
             trained: TrainedLog::of_moves(part),
@@ -279,6 +282,7 @@ impl<'a> Pass<'a> {
         let logs = std::slice::from_ref(&prepared);
         let (shape, kept) = (&structure.shape, &structure.base.kept);
         let rows = LogRows::new(model, shape, kept, logs, self.choices, &self.settings)?;
+        let rows = if self.delays { rows.with_delay_columns()? } else { rows };
         if self.blocks.is_empty() {
             let length = least_block_samples(self.choices.kernel_hz, prepared.rate_hz, &self.settings);
             let blocks = |shape: &GroupShape| {

@@ -207,9 +207,12 @@ class Estimate:
         (`Robot.from_mujoco`, `Robot.from_pinocchio`)."""
         return _models.apply(self.record, model)
 
-    def reduce(self, logs: LogOrPath | Iterable[LogOrPath]) -> Factor:
-        """Reduces logs by the choices of this identification to a `Factor`."""
-        return Factor(_native.Factor.of(self._native, native_logs(logs)))
+    def reduce(self, logs: LogOrPath | Iterable[LogOrPath], *, delays: bool = False) -> Factor:
+        """Reduces logs by the choices of this identification to a `Factor`.
+
+        `delays`: with a column per effort for the rest of its delay, log by log, so that a fleet sees how delays differ and change.
+        """
+        return Factor(_native.Factor.of(self._native, native_logs(logs), delays))
 
     def __repr__(self) -> str:
         return f"{self._native!r}\n{self.headline}"

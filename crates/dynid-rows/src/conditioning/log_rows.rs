@@ -77,6 +77,8 @@ pub(super) struct ConditionedLog<'a> {
     pub(super) kernels: Kernels,
     /// Per output: effort led by the delay.
     efforts: Vec<Vec<f64>>,
+    /// Per output: its derivative, where rows have a column for the rest of the delay.
+    slopes: Option<Vec<Vec<f64>>>,
     block_length: usize,
     blocks: usize,
 }
@@ -99,7 +101,17 @@ impl<'a> ConditionedLog<'a> {
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
         let (block_length, blocks) = time_blocks(log, choices.kernel_hz, choices.state_hz.len(), settings);
-        Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
+        Ok(ConditionedLog {
+            log,
+            states,
+            instruments: None,
+            masks,
+            kernels,
+            efforts,
+            slopes: None,
+            block_length,
+            blocks,
+        })
     }
 }
 
@@ -144,6 +156,34 @@ impl<'a> LogRows<'a> {
         }
         for group in &mut self.groups {
             group.columns = paired_columns(&group.columns, self.columns.total);
+        }
+        Ok(self)
+    }
+
+    /// Rows with a column more per output, behind all base columns: the derivative of its effort, whose parameter is the rest of the delay of the
+    /// motion behind it, s.
+    ///
+    /// `y(t - δ) = W x` with the effort `y` led by the delay of the choices gives `y = W x + δ dy/dt`, for `δ` well below the period of what
+    /// passes the kernel. The derivative goes through the kernel like the effort; its noise is uncorrelated with that of the effort, and what it
+    /// adds to the column is what the kernel lets pass.
+    ///
+    /// # Errors
+    /// [`ConditioningError::Signal`] for an effort that is not finite.
+    ///
+    /// # Panics
+    /// If the rows are paired with instruments.
+    pub fn with_delay_columns(mut self) -> Result<Self, ConditioningError> {
+        for log in &mut self.logs {
+            assert!(log.instruments.is_none(), "rows with a measured motion alone");
+            let rate = log.log.rate_hz;
+            let per_second = |effort: &Vec<f64>| -> Result<Vec<f64>, ConditioningError> {
+                let per_sample = shift::shift_derivative(effort, 0.0)?.values;
+                Ok(per_sample.into_iter().map(|slope| rate * slope).collect())
+            };
+            log.slopes = Some(log.efforts.iter().map(per_second).collect::<Result<_, _>>()?);
+        }
+        for group in &mut self.groups {
+            group.columns.push(self.columns.total + group.output);
         }
         Ok(self)
     }
@@ -196,6 +236,8 @@ impl RowSource for LogRows<'_> {
                     visitors,
                     first_group: first_group + output * scales,
                     effort: &log.efforts[output],
+                    slope: log.slopes.as_ref().map(|slopes| &slopes[output][..]),
+                    with_slope: Vec::new(),
                     kernels: &log.kernels.kernels,
                     columns: self.columns.local[output].len() * (1 + usize::from(log.instruments.is_some())),
                     block_length: log.block_length,
@@ -229,6 +271,9 @@ struct OutputRows<'a, 'b> {
     visitors: &'a mut [&'b mut dyn RowVisitor],
     first_group: usize,
     effort: &'a [f64],
+    /// Derivative of the effort, and the columns with it.
+    slope: Option<&'a [f64]>,
+    with_slope: Vec<f64>,
     kernels: &'a [Kernel],
     columns: usize,
     block_length: usize,
@@ -242,6 +287,16 @@ impl RowConsumer for OutputRows<'_, '_> {
         self.net_effort = means(&self.kernels[batch.scale], self.effort, batch.centres.iter().copied());
         let offset = &batch.columns[self.columns * batch.stride..][..n];
         self.net_effort.iter_mut().zip(offset).for_each(|(effort, known)| *effort -= known);
+        let mut columns = batch.columns;
+        if let Some(slope) = self.slope {
+            // In the place of the offset, which was taken off.
+            self.with_slope.clear();
+            self.with_slope.extend_from_slice(&batch.columns[..self.columns * batch.stride]);
+            let slope = means(&self.kernels[batch.scale], slope, batch.centres.iter().copied());
+            self.with_slope.extend(slope);
+            self.with_slope.resize((self.columns + 1) * batch.stride, 0.0);
+            columns = &self.with_slope;
+        }
         let mut start = 0;
         while start < n {
             let block_of = |centre: usize| (centre / self.block_length).min(self.blocks - 1);
@@ -250,7 +305,7 @@ impl RowConsumer for OutputRows<'_, '_> {
             let rows = Rows {
                 block,
                 samples: &batch.centres[start..start + count],
-                regressor: &batch.columns[start..],
+                regressor: &columns[start..],
                 stride: batch.stride,
                 effort: &self.net_effort[start..start + count],
             };

@@ -11,7 +11,7 @@ use dynid_model::Owner;
 
 use super::{FleetFault, FleetSettings};
 use crate::Error;
-use crate::reduce::Recipe;
+use crate::reduce::{Column, Recipe};
 
 /// Symbol of the inertia of a rotor, which robots of a type share.
 const ROTOR: &str = "Ia";
@@ -21,6 +21,8 @@ const SAME_MOTION: f64 = 0.05;
 /// Names of what a fleet counts.
 #[derive(Debug)]
 pub(super) struct Built {
+    /// Columns of the fleet.
+    pub(super) columns: Vec<Column>,
     /// Robots, in the order of the fleet's.
     pub(super) robots: Vec<String>,
     /// What is known of logs beside their factors, in the order of the fleet's.
@@ -50,7 +52,7 @@ pub(super) fn fleet(
     let mut warnings = Vec::new();
     let covariates = covariates(&origins, settings, &mut warnings)?;
     let (varying, positive) = varying(recipe, settings)?;
-    let scales = recipe.choices.scales_hz.len();
+    let (columns, scales) = (recipe.all_columns(), recipe.choices.scales_hz.len());
     let undated = origins.iter().filter(|o| o.start_s.is_none()).count();
     let of_log = |(log, origin): (&ReducedLog, &Origin)| {
         let channel = |g: &dynid_factor::groups::ReducedGroup| ChannelFactor {
@@ -74,7 +76,7 @@ pub(super) fn fleet(
     let facts: Vec<LogFacts> = logs.into_iter().map(|log| log.facts).collect();
     let key = |name: &String| u64::from_be_bytes(std::array::from_fn(|i| sha256_bytes(name.as_bytes())[i]));
     let fleet = Fleet {
-        columns: recipe.columns.len(),
+        columns: columns.len(),
         channels: recipe.outputs.len() * scales,
         robots: robots.iter().map(key).collect(),
         covariates: covariates.len(),
@@ -100,7 +102,7 @@ pub(super) fn fleet(
         );
     }
     let starts = origins.iter().map(|o| o.start_s).collect();
-    Ok((fleet, Built { robots, facts, starts, undated, covariates, positive, warnings }))
+    Ok((fleet, Built { columns, robots, facts, starts, undated, covariates, positive, warnings }))
 }
 
 /// Covariates that are taken.
@@ -194,8 +196,9 @@ fn varying(recipe: &Recipe, settings: &FleetSettings) -> Result<(Vec<Coordinate>
 
 /// Rows that hold every column within its size, for what no log tells.
 pub(super) fn prior(recipe: &Recipe) -> Mat {
-    let p = recipe.columns.len();
-    Mat::from_fn(p, p + 1, |i, j| if i == j { recipe.columns[i].scale.recip() } else { 0.0 })
+    let columns = recipe.all_columns();
+    let p = columns.len();
+    Mat::from_fn(p, p + 1, |i, j| if i == j { columns[i].scale.recip() } else { 0.0 })
 }
 
 /// Robots whose logs all have the same motion.
@@ -223,10 +226,10 @@ fn same_motion(fleet: &Fleet, names: &[String]) -> Option<String> {
 }
 
 /// What the fit says, with names.
-pub(super) fn said(error: &FleetError, recipe: &Recipe, built: &Built) -> String {
+pub(super) fn said(error: &FleetError, built: &Built) -> String {
     match error {
         FleetError::NotExcited { columns } => {
-            let names: Vec<&str> = columns.iter().map(|c| recipe.columns[*c].name.as_str()).collect();
+            let names: Vec<&str> = columns.iter().map(|c| built.columns[*c].name.as_str()).collect();
             format!("no log of the fleet tells {}", names.join(", "))
         }
         FleetError::Constant { covariate, value } => {

@@ -209,7 +209,7 @@ pub fn fleet(
         ));
     }
     progress(FleetStep::Fit);
-    let told = |error: FleetError| FleetFault::Fit(build::said(&error, &recipe, &built), error);
+    let told = |error: FleetError| FleetFault::Fit(build::said(&error, &built), error);
     let found = fit(&fleet, &FitSettings { prior: Some(build::prior(&recipe)), ..FitSettings::default() })
         .map_err(told)?;
     let mut changes = None;

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use dynid_estimate::metrics::FitSums;
 use dynid_factor::Factor;
 use dynid_factor::groups::ReducedGroup;
-use dynid_fleet::{FleetError, FleetFit, RobotFit};
+use dynid_fleet::{FleetError, FleetFit};
 use dynid_identify::Identification;
 use dynid_identify::caution::{self, Caution};
 use dynid_identify::preflight::Finding;
@@ -44,8 +44,13 @@ impl FleetResult {
         let without = self.without_unexplained(&pooled)?;
         let fit = without.as_ref().unwrap_or(&self.fit);
         let said = fit.said_by_robots().map_err(|error| self.fault(error))?;
-        pooled.blocks = said.into_iter().map(|(_, factor)| factor).collect();
-        pooled.covariance = fit.jackknife.as_ref().unwrap_or(&fit.covariance).clone();
+        let delays: Vec<usize> = (self.recipe.columns.len()..self.fleet.columns).collect();
+        let of_bodies = |(_, factor): (usize, Factor)| match &delays[..] {
+            [] => factor,
+            delays => factor.freed_of(delays),
+        };
+        pooled.blocks = said.into_iter().map(of_bodies).collect();
+        pooled.covariance = self.without_delays(fit.jackknife.as_ref().unwrap_or(&fit.covariance));
         pooled.cautions.extend(file.warnings.iter().map(|w| Caution::warn(caution::FLEET, w, LOOK)));
         self.recipe.solve_pooled(pooled)
     }
@@ -79,10 +84,14 @@ impl FleetResult {
             None => None,
         };
         let fitted = without.as_ref().unwrap_or(fitted);
-        let shared = of_type.base.values(of_type.values());
+        let p = self.recipe.columns.len();
+        let (values, covariance) = (&fitted.values[..p], self.without_delays(&fitted.covariance));
+        let of_type_columns = of_type.base.values(of_type.values());
+        let shared: Vec<usize> = self.fleet.shared().into_iter().filter(|c| *c < p).collect();
+        let values = given_shared(values, &covariance, &shared, &of_type_columns);
         let rows: usize = pooled.rows.iter().map(ReducedGroup::rows).sum();
-        pooled.blocks = vec![around(&given_shared(fitted, &self.fleet.shared(), &shared), fitted, rows)];
-        pooled.covariance = fitted.covariance.clone();
+        pooled.blocks = vec![around(&values, &covariance, rows)];
+        pooled.covariance = covariance;
         let chosen = of_type.consistent.prior_trials.get(of_type.consistent.chosen);
         pooled.prior_weight = chosen.map(|trial| SPLIT * trial.weight);
         pooled.cautions.extend(reservations(robot));
@@ -124,13 +133,20 @@ impl FleetResult {
         Ok(Some(fit))
     }
 
+    /// A covariance of columns of the model alone.
+    fn without_delays(&self, covariance: &Mat) -> Mat {
+        let p = self.recipe.columns.len();
+        Mat::from_fn(p, p, |i, j| covariance[(i, j)])
+    }
+
     fn fault(&self, error: FleetError) -> FleetFault {
-        FleetFault::Fit(build::said(&error, &self.recipe, &self.built), error)
+        FleetFault::Fit(build::said(&error, &self.built), error)
     }
 
     /// Figures of logs, each at its own values; blocks and covariance are left empty.
     fn pooled(&self, name: &str, logs: &[usize], values: &[f64], basis: Basis) -> Pooled {
         let (outputs, scales) = (self.recipe.outputs.len(), self.recipe.choices.scales_hz.len());
+        let p = self.recipe.columns.len();
         let mut left = vec![(0, 0.0); outputs * scales];
         let mut sums = Vec::with_capacity(logs.len());
         for k in logs {
@@ -153,8 +169,8 @@ impl FleetResult {
             log: 0,
             output: channel / scales,
             scale: channel % scales,
-            columns: (0..values.len()).collect(),
-            blocks: vec![Factor::from_triangle(values.len(), |_, _| 0.0, rss.sqrt(), *rows)],
+            columns: (0..p).collect(),
+            blocks: vec![Factor::from_triangle(p, |_, _| 0.0, rss.sqrt(), *rows)],
         };
         let facts: Vec<&LogFacts> = logs.iter().map(|k| &self.built.facts[*k]).collect();
         Pooled {
@@ -172,16 +188,16 @@ impl FleetResult {
     }
 }
 
-/// Values of a robot, those of the shared columns given.
-fn given_shared(robot: &RobotFit, shared: &[usize], values: &[f64]) -> Vec<f64> {
-    let (c, n) = (&robot.covariance, shared.len());
+/// Values `x` of covariance `c`, those of the shared columns given.
+fn given_shared(x: &[f64], c: &Mat, shared: &[usize], values: &[f64]) -> Vec<f64> {
+    let n = shared.len();
     let sd: Vec<f64> = shared.iter().map(|i| c[(*i, *i)].sqrt()).collect();
     let correlation = correlation(&sd, |i, j| c[(shared[i], shared[j])]);
-    let moved = Mat::from_fn(n, 1, |i, _| (values[shared[i]] - robot.values[shared[i]]) / sd[i]);
+    let moved = Mat::from_fn(n, 1, |i, _| (values[shared[i]] - x[shared[i]]) / sd[i]);
     let Some(moved) = correlation.cholesky().map(|factor| factor.solve(&moved)) else {
         unreachable!("correlations and what rounding takes from them")
     };
-    let mut out = robot.values.clone();
+    let mut out = x.to_vec();
     for (i, x) in out.iter_mut().enumerate() {
         match shared.binary_search(&i) {
             Ok(_) => *x = values[i],
@@ -191,9 +207,9 @@ fn given_shared(robot: &RobotFit, shared: &[usize], values: &[f64]) -> Vec<f64> 
     out
 }
 
-/// Rows of unit variance whose least squares are `x`, with the covariance of a robot.
-fn around(x: &[f64], robot: &RobotFit, rows: usize) -> Factor {
-    let (c, p) = (&robot.covariance, x.len());
+/// Rows of unit variance whose least squares are `x`, with covariance `c`.
+fn around(x: &[f64], c: &Mat, rows: usize) -> Factor {
+    let p = x.len();
     let sd: Vec<f64> = (0..p).map(|i| c[(i, i)].sqrt()).collect();
     let Some(root) = correlation(&sd, |i, j| c[(i, j)]).cholesky() else {
         unreachable!("correlations and what rounding takes from them")
@@ -215,7 +231,7 @@ fn correlation(sd: &[f64], covariance: impl Fn(usize, usize) -> f64) -> Mat {
 fn reservations(robot: &RobotRecord) -> Vec<Caution> {
     let changed = robot.changes.iter().map(|c| {
         let message = format!(
-            "`{}` of {} has changed by {:+.3} ± {:.3} ({}): its value is that at the last log, as a {} explains it",
+            "`{}` of {} has changed by {:+.3e} ± {:.1e} ({}): its value is that at the last log, as a {} explains it",
             c.parameter, robot.name, c.size, c.sd, c.date.text, c.kind
         );
         Caution::warn(caution::FLEET, message, "find the cause, and record the robot again: what changes goes on changing")

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
 use dynid_fleet::{FEW, Noise};
+use dynid_identify::reduction::DELAY;
 use dynid_record::{Outcome, words};
 use serde::{Deserialize, Serialize};
 
@@ -334,12 +335,12 @@ impl FleetResult {
 
     /// Name of coordinate `k`.
     pub(super) fn name(&self, k: usize) -> String {
-        self.recipe.columns[self.fleet.varying[k].column].name.clone()
+        self.built.columns[self.fleet.varying[k].column].name.clone()
     }
 
     /// Unit of coordinate `k`.
     pub(super) fn unit(&self, k: usize) -> String {
-        self.recipe.columns[self.fleet.varying[k].column].unit.clone()
+        self.built.columns[self.fleet.varying[k].column].unit.clone()
     }
 
     fn parameters(&self) -> Vec<FleetParameter> {
@@ -364,7 +365,7 @@ impl FleetResult {
                 between_logs: spread(&fit.variances.logs, |v| v.between_logs),
             }
         };
-        self.recipe.columns.iter().enumerate().map(of).collect()
+        self.built.columns.iter().enumerate().map(of).collect()
     }
 
     fn covariates(&self) -> Vec<CovariateRecord> {
@@ -482,6 +483,7 @@ impl FleetResult {
                 change.together
             ),
             "fo" => "an offset: zero or brake, cable, current sensor".to_owned(),
+            DELAY => "the delay of the effort: drive, bus, or what logs them".to_owned(),
             _ if self.built.covariates.is_empty() => {
                 "friction: wear or damage; or temperature, lubricant or load, none of which is stated"
                     .to_owned()

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use dynid::Error;
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::Estimate;
+use dynid::estimators::groups::ReducedGroup;
 use dynid::io::MappingSpec;
 use dynid::io::digest::sha256_bytes;
 use dynid::log::Log;
@@ -36,7 +37,7 @@ pub(crate) fn learned() -> &'static Learned {
     LEARNED.get_or_init(|| {
         let [first, second, _] = parts();
         let robot = example("robot.toml");
-        learn(&Config { robot, log: vec![first, second], ..Config::default() }, &mut |_| {}).unwrap()
+        learn(&Config { robot, log: vec![first, second], ..Config::default() }, false, &mut |_| {}).unwrap()
     })
 }
 
@@ -152,7 +153,7 @@ fn what_no_recipe_knows_is_refused() {
         let mut config =
             Config { robot: robot.clone(), log: vec![first.clone(), second.clone()], ..Config::default() };
         change(&mut config);
-        learn(&config, &mut |_| {}).unwrap_err().to_string()
+        learn(&config, false, &mut |_| {}).unwrap_err().to_string()
     };
     let textbook = refused(&|c| c.conditioning.route = dynid::config::Route::Textbook);
     assert!(textbook.contains("textbook route"), "{textbook}");
@@ -162,12 +163,67 @@ fn what_no_recipe_knows_is_refused() {
     assert!(single.contains("terms of single logs"), "{single}");
 }
 
+/// What a delay in one log does to factors with columns for it: it is told, and the solution does not move.
+#[test]
+fn delays_of_single_logs_have_columns_of_their_own() {
+    let recipe = learned().reduction.recipe().clone().with_delays();
+    assert_ne!(recipe.hash(), learned().reduction.recipe().hash());
+    let reducer = recipe.clone().reducer().unwrap();
+    let [first, second, _] = parts();
+    let rate = recipe.choices.rate_hz;
+    let late = 0.4 / rate;
+    let shifted = |log: &Log| {
+        let (time, mut joints, channels) = log.log.clone().into_parts();
+        for joint in &mut joints {
+            joint.effort = dynid::motion::shift::shift(&joint.effort, late * rate).unwrap().values;
+        }
+        Log::new(reducer.robot(), Recording::new(log.log.name(), time, joints, channels).unwrap()).unwrap()
+    };
+    let (plain, other) = (load(&first), load(&second));
+    let moved = shifted(&plain);
+    let of = |logs: Vec<Log>| {
+        let made = Reduction::of(&reducer, logs).unwrap();
+        Reduction::from_bytes(&made.to_bytes(), "delays").unwrap()
+    };
+    // With all other values as they fit the log before, the efforts of the late one ask for so much more delay.
+    let (before, after) = (of(vec![plain.clone()]), of(vec![moved.clone()]));
+    for (a, b) in before.logs()[0].groups.iter().zip(&after.logs()[0].groups).filter(|(g, _)| g.scale == 0) {
+        let merged =
+            |g: &ReducedGroup| dynid::estimators::Factor::merge(&g.blocks.iter().collect::<Vec<_>>());
+        let x = dynid::estimators::linear::ols(&merged(a)).x;
+        let loss = |more: f64| {
+            let mut x = x.clone();
+            *x.last_mut().unwrap() += more;
+            merged(b).rss(&x)
+        };
+        let (less, same, more) = (loss(-late), loss(0.0), loss(late));
+        let least = 0.5 * late * (less - more) / (less - 2.0 * same + more);
+        assert!((least - late).abs() < 0.03 * late, "output {}: {least} of {late}", a.output);
+    }
+    let solved = |logs| of(logs).solve([], &mut |_| {}).unwrap().estimate();
+    let (a, b) = (solved(vec![plain.clone(), other.clone()]), solved(vec![moved.clone(), other.clone()]));
+    let fixed = |logs| {
+        let reducer = learned().reduction.recipe().clone().reducer().unwrap();
+        Reduction::of(&reducer, logs).unwrap().solve([], &mut |_| {}).unwrap().estimate()
+    };
+    let (c, d) = (fixed(vec![plain, other.clone()]), fixed(vec![moved, other]));
+    let far = |a: &Estimate, b: &Estimate| {
+        let of = |(x, y): (&dynid::estimate::BaseValue, &dynid::estimate::BaseValue)| {
+            Some((x.value? - y.value?).abs() / x.std?)
+        };
+        a.base_parameters.iter().zip(&b.base_parameters).filter_map(of).fold(0.0, f64::max)
+    };
+    let (with, without) = (far(&a, &b), far(&c, &d));
+    assert!(with < 0.2 * without && with < 0.5, "{with} with columns, {without} without");
+    assert_eq!(a.base_parameters.len(), c.base_parameters.len(), "delays are no parameters of the robot");
+}
+
 #[test]
 fn what_a_pre_flight_found_and_a_recipe_doubts_is_not_lost_with_the_samples() {
     let [first, second, third] = parts();
     let mut config = Config { robot: example("robot.toml"), log: vec![first, second], ..Config::default() };
     config.preflight = Preflight::Warn;
-    let learned = learn(&config, &mut |_| {}).unwrap();
+    let learned = learn(&config, false, &mut |_| {}).unwrap();
     let recipe = learned.reduction.recipe().clone();
     assert!(recipe.doubts.is_empty(), "{:?}", recipe.doubts);
     let check = |estimate: &Estimate, name: &str| {
@@ -211,7 +267,7 @@ fn doubts_of_a_recipe_are_doubts_of_what_is_solved_by_it() {
     config.elements.default = Some(vec!["offset".to_owned()]);
     config.elements.friction = dynid::config::Friction::Given;
     config.preflight = Preflight::Warn;
-    let learned = learn(&config, &mut |_| {}).unwrap();
+    let learned = learn(&config, false, &mut |_| {}).unwrap();
     let open: Vec<_> = learned.estimate.verdict.checks.iter().filter(|c| c.status.word() != "ok").collect();
     let doubts = &learned.reduction.recipe().doubts;
     assert!(!doubts.is_empty() && doubts.iter().all(|d| open.iter().any(|c| c.name == d.name)), "{open:?}");
@@ -225,7 +281,7 @@ fn factors_of_another_recipe_do_not_mix() {
     let [first, ..] = parts();
     let mut config = Config { robot: example("robot.toml"), log: vec![first], ..Config::default() };
     config.conditioning.kernel_hz = Some(2.0);
-    let other = learn(&config, &mut |_| {}).unwrap().reduction;
+    let other = learn(&config, false, &mut |_| {}).unwrap().reduction;
     let found = Reduction::merge([learned().reduction.clone(), other]).unwrap_err();
     assert!(matches!(found, ReductionError::OtherRecipe { .. }), "{found}");
     assert_eq!(Reduction::merge([]).unwrap_err(), ReductionError::Nothing);

@@ -119,6 +119,22 @@ fn windows_leave_what_the_whole_log_leaves() {
     }
 }
 
+/// Columns for the rest of delays are formed window by window too.
+#[test]
+fn windows_leave_columns_of_delays_as_the_whole_log_does() {
+    let with_delays = |part_rows, samples| {
+        let reducer = learned().reduction.recipe().clone().with_delays().reducer().unwrap();
+        reducer.with_windows(WindowSettings { part_rows, samples })
+    };
+    let signals = with_a_row_more();
+    let whole = with_delays(4000, 1).reduce(log(signals.clone())).unwrap();
+    let columns = learned().reduction.recipe().columns.len();
+    assert!(whole.groups.iter().all(|g| g.columns.last() == Some(&(columns + g.output))));
+    let windows = with_delays(3000, 700).reduce(log(signals)).unwrap();
+    let found = apart(&whole, &windows);
+    assert!(found < 1e-12, "{found:e}");
+}
+
 #[test]
 fn windows_of_a_log_with_gaps_jitter_and_spikes_leave_what_the_whole_leaves() {
     let mut more = Portion::of(with_a_row_more());
