@@ -72,6 +72,9 @@ pub(crate) struct FleetArgs {
     /// Robot that gets a page and a model of its own even if nothing is the matter; repeat for several.
     #[arg(long, value_name = "NAME")]
     pub(crate) robot: Vec<String>,
+    /// A page and a model of every robot.
+    #[arg(long, conflicts_with = "robot")]
+    pub(crate) all_robots: bool,
     /// Folder for fleet.json, report.html, type.json, type.html, robots/NAME.html and robots/NAME.json.
     #[arg(long, value_name = "FOLDER", default_value = "dynid-fleet", value_hint = ValueHint::DirPath)]
     pub(crate) out: PathBuf,

@@ -90,7 +90,8 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
     file.provenance.command_line = command_line();
     file.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     let page = found.report(&file)?;
-    let pages = found.robot_pages(&file, &args.robot)?;
+    let all: Vec<String> = file.robots.iter().map(|r| r.name.clone()).collect();
+    let pages = found.robot_pages(&file, if args.all_robots { &all } else { &args.robot })?;
     progress.fleet(FleetStep::Models);
     let of_type = found.type_model(&file)?;
     let stamped = |model: &Identification| {

@@ -296,8 +296,10 @@ fn shards_orders_and_kills_change_nothing() {
     );
     let again: Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!((&again["known"], &again["reduced"]), (&144.into(), &0.into()));
-    run(at, &["fleet", "shards", "--out", "again", "--quiet"], 0);
+    run(at, &["fleet", "shards", "--all-robots", "--out", "again", "--quiet"], 0);
     assert_eq!(result("again"), result("whole"));
+    let files = std::fs::read_dir(at.join("again/robots")).unwrap().count();
+    assert_eq!(files, 2 * 12, "a page and a model of every robot");
     let threads = dynid()
         .current_dir(at)
         .env("RAYON_NUM_THREADS", "1")
