@@ -2,13 +2,15 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynid::estimate::Split;
 use dynid::model::{EffortModel, MotionBlock};
 use dynid::online::Session;
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Robot, RobotOptions, Run, identify};
+
+use tempfile::TempDir;
 
 use crate::support::write_log;
 
@@ -34,12 +36,6 @@ reaction_friction = { loads = [{ force = "radial", radius = 0.03 }], mu_c = 0.2,
 elements = ["viscous", "coulomb"]
 "#;
 
-fn folder(test: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("dynid-loads-{test}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 /// A log of a minute whose motion is known well.
 fn settings(effort_noise: f64) -> SimulateSettings {
     SimulateSettings {
@@ -53,7 +49,7 @@ fn settings(effort_noise: f64) -> SimulateSettings {
 }
 
 struct Bench {
-    folder: PathBuf,
+    folder: TempDir,
     truth: Vec<(String, f64)>,
     /// Noise of the efforts of the held-out log.
     noise: Vec<f64>,
@@ -68,7 +64,8 @@ fn rms(x: &[f64]) -> f64 {
 impl Bench {
     /// A log to learn from and another one.
     fn new(test: &str, robot: &str, settings: &SimulateSettings) -> Self {
-        let folder = folder(test);
+        let kept = tempfile::Builder::new().prefix(&format!("dynid-loads-{test}-")).tempdir().unwrap();
+        let folder = kept.path();
         std::fs::write(folder.join("robot.toml"), robot).unwrap();
         let robot = Robot::load(&folder.join("robot.toml"), &RobotOptions::default()).unwrap();
         let log = |seed| simulate(&robot, &SimulateSettings { seed, ..settings.clone() }).unwrap();
@@ -76,18 +73,18 @@ impl Bench {
         write_log(&train, &folder.join("train.csv"));
         write_log(&held, &folder.join("held.csv"));
         let noise = held.clean[3].iter().map(|e| settings.effort_noise * rms(e)).collect();
-        Bench { folder, truth: train.truth, noise, clean: held.clean }
+        Bench { folder: kept, truth: train.truth, noise, clean: held.clean }
     }
 
     /// A run with more keys of its own and of the log to learn from.
     fn config(&self, more: &str, of_log: &str) -> Config {
         let text = format!(
             "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n{of_log}\n[[validation]]\npath = {:?}\n",
-            self.folder.join("robot.toml"),
-            self.folder.join("train.csv"),
-            self.folder.join("held.csv"),
+            self.folder.path().join("robot.toml"),
+            self.folder.path().join("train.csv"),
+            self.folder.path().join("held.csv"),
         );
-        Config::parse(&text, &self.folder.join("run.toml").display().to_string()).unwrap()
+        Config::parse(&text, &self.folder.path().join("run.toml").display().to_string()).unwrap()
     }
 
     fn identify(&self, more: &str) -> Run {
@@ -350,7 +347,10 @@ fn work_that_knows_no_loads_is_refused() {
         ("[[payload]]\nname = \"tool\"", "payload = \"tool\"", "payloads of logs"),
         (
             "",
-            &format!("own = [\"friction_scale\"]\n[[log]]\npath = {:?}", bench.folder.join("held.csv")),
+            &format!(
+                "own = [\"friction_scale\"]\n[[log]]\npath = {:?}",
+                bench.folder.path().join("held.csv")
+            ),
             "beside `reaction_friction`",
         ),
     ] {

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may stop, and says what it measured")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynid::compare::compare;
 use dynid::estimate::{Estimate, Split};
@@ -11,6 +11,8 @@ use dynid::record::{ParameterVerdict, Status};
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::verdict::CheckName;
 use dynid::{Config, Robot, RobotOptions, Run, identify};
+
+use tempfile::TempDir;
 
 use crate::support::write_log;
 
@@ -73,7 +75,7 @@ const TRUTH: &str = r#"
 const GIVEN: &str = "[elements]\nfriction = \"given\"\n";
 
 struct Bench {
-    folder: PathBuf,
+    folder: TempDir,
     truth: Vec<(String, f64)>,
 }
 
@@ -84,8 +86,8 @@ impl Bench {
     }
 
     fn of_seed(test: &str, other: &[(&str, f64)], seed: u64) -> Self {
-        let folder = std::env::temp_dir().join(format!("dynid-ties-{test}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        let kept = tempfile::Builder::new().prefix(&format!("dynid-ties-{test}-")).tempdir().unwrap();
+        let folder = kept.path();
         std::fs::write(folder.join("robot.toml"), TORSO).unwrap();
         let robot = Robot::load(&folder.join("robot.toml"), &RobotOptions::default()).unwrap();
         let table: toml::Table = TRUTH.parse().unwrap();
@@ -105,17 +107,17 @@ impl Bench {
             write_log(&log, &folder.join(file));
             truth = log.truth;
         }
-        Bench { folder, truth }
+        Bench { folder: kept, truth }
     }
 
     fn config(&self, more: &str) -> Config {
         let text = format!(
             "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n[[validation]]\npath = {:?}\n",
-            self.folder.join("robot.toml"),
-            self.folder.join("train.csv"),
-            self.folder.join("held.csv"),
+            self.folder.path().join("robot.toml"),
+            self.folder.path().join("train.csv"),
+            self.folder.path().join("held.csv"),
         );
-        Config::parse(&text, &self.folder.join("run.toml").display().to_string()).unwrap()
+        Config::parse(&text, &self.folder.path().join("run.toml").display().to_string()).unwrap()
     }
 
     fn identify(&self, more: &str) -> Run {
@@ -273,8 +275,8 @@ fn ties_that_cannot_hold_are_refused() {
     let fault = |more: &str| {
         let text = format!(
             "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n",
-            bench.folder.join("robot.toml"),
-            bench.folder.join("train.csv")
+            bench.folder.path().join("robot.toml"),
+            bench.folder.path().join("train.csv")
         );
         let config = Config::parse(&text, "run.toml").map_err(|e| e.to_string());
         config
