@@ -550,7 +550,7 @@ const BEYOND_CHANCE: f64 = 10.0;
 fn price_over_chance(id: &Identification, found: &ConsistentEstimate) -> CheckResult {
     let chance = id.fitted.inflation * id.fit().solution.kept.len() as f64;
     let over = if chance > 0.0 { found.price() / chance } else { 0.0 };
-    let settled = found.status != ConsistentStatus::Stalled;
+    let settled = is_settled(found);
     let meaning = if over <= 1.0 {
         "bodies that can exist, and friction that takes energy out, cost no more of the fit than chance does"
     } else {
@@ -564,6 +564,14 @@ fn price_over_chance(id: &Identification, found: &ConsistentEstimate) -> CheckRe
         "at most 1",
         meaning,
     )
+}
+
+/// A better fit by up to so many residual variances moves no value by more than 3 % of its standard deviation.
+const NEGLIGIBLE_GAP: f64 = 1e-3;
+
+/// Whether a better fit that could matter is ruled out: of a search that ends at rounding the certificate says by how little it may be off.
+fn is_settled(found: &ConsistentEstimate) -> bool {
+    found.status != ConsistentStatus::Stalled || found.gap <= NEGLIGIBLE_GAP
 }
 
 /// Held-out error may rise by this much before consistency counts as dear, percent.
@@ -600,14 +608,14 @@ fn consistency(id: &Identification) -> Option<CheckResult> {
         names.join(", ")
     };
     Some(check(
-        graded(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
+        graded(cost <= CHEAP && is_settled(found), cost <= DEAR),
         CheckName::PriceOfConsistency,
         rise,
         "%",
         "error on held-out folds and on validation logs rises by at most 2 %",
         if found.status == ConsistentStatus::Unconstrained {
             "the parameters that fit best belong to bodies that can exist".to_owned()
-        } else if found.status == ConsistentStatus::Stalled {
+        } else if !is_settled(found) {
             format!(
                 "the parameters are consistent, but a better fit by up to {:.2e} residual variances is not ruled out",
                 found.gap

@@ -14,7 +14,7 @@ fn robots() -> Vec<PathBuf> {
     let files = |folder: PathBuf| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut found: Vec<PathBuf> = files(root.join("robots")).collect();
     found.extend(files(root.join("examples")).map(|folder| folder.join("robot.toml")));
-    found.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    found.retain(|path| path.is_file() && path.extension().is_some_and(|e| e == "toml"));
     found.sort();
     assert!(found.len() >= 10, "{found:?}");
     found
