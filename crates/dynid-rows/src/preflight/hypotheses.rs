@@ -168,7 +168,7 @@ impl Look<'_> {
         // Beyond the ends of the record nothing is known of the efforts.
         let reach = (step * steps) as usize;
         let mut inner = (*samples).clone();
-        let ends = inner.joints.first().map_or(0, |j| j.whole_effort.len()).saturating_sub(reach);
+        let ends = trial.log.samples().saturating_sub(reach);
         let known: Vec<bool> = inner.kept.iter().map(|k| (reach..ends).contains(k)).collect();
         for joint in &mut inner.joints {
             joint.sliding.iter_mut().zip(&known).for_each(|(sliding, known)| *sliding &= known);
@@ -176,7 +176,7 @@ impl Look<'_> {
         let columns = KeptColumns::new(trial.model, trial.kept);
         let block = regressor(trial.model, trial.shape, samples, wiring);
         let of_output = |output: usize| -> Result<Vec<f64>, PreflightError> {
-            let effort = &samples.joints[wiring.effort[output].joint].whole_effort;
+            let effort = trial.whole_effort(wiring.effort[output].joint, trial.delay_s)?;
             let last = effort.len() as f64 - 1.0;
             let at = |lag: &f64| -> Vec<f64> {
                 samples.kept.iter().map(|k| effort[(*k as f64 - lag).clamp(0.0, last) as usize]).collect()

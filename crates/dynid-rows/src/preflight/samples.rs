@@ -1,11 +1,9 @@
 //! A record as trial models see it: filtered, thinned, away from edges.
 
-use std::sync::Arc;
-
 use super::wiring::{Source, Wiring};
 use dynid_motion::cutoff::{CutoffSettings, kernel_limit};
-use dynid_motion::difference::central;
-use dynid_motion::filter::{butterworth, forward_backward_in_step};
+use dynid_motion::difference::{central, central_part};
+use dynid_motion::filter::{Sections, butterworth, forward_backward_in_step};
 use dynid_motion::mask::{dilate, near_reversal};
 use dynid_motion::signal::rms;
 use dynid_motion::spectrum::{NoiseSettings, position_noise};
@@ -25,6 +23,11 @@ pub(crate) const BLOCKS: usize = 12;
 /// Fewest samples worth a trial.
 const FEWEST: usize = 60;
 
+/// The filter of a pre-flight.
+pub(super) fn low_pass(cutoff_hz: f64, rate_hz: f64) -> Result<Sections, SignalError> {
+    butterworth(4, cutoff_hz, rate_hz)
+}
+
 /// Signals of one joint at the kept samples.
 #[derive(Debug, Clone)]
 pub(crate) struct JointSamples {
@@ -32,8 +35,6 @@ pub(crate) struct JointSamples {
     pub(crate) velocity: Vec<f64>,
     pub(crate) acceleration: Vec<f64>,
     pub(crate) effort: Vec<f64>,
-    /// The filtered effort at every sample of the log.
-    pub(crate) whole_effort: Arc<Vec<f64>>,
     /// Whether the joint is away from reversal.
     pub(crate) sliding: Vec<bool>,
     /// Whether the joint moves at all.
@@ -92,7 +93,7 @@ impl Samples {
         moves: &[bool],
         cutoff_hz: f64,
     ) -> Result<Option<Samples>, SignalError> {
-        let filter = butterworth(4, cutoff_hz, log.rate_hz)?;
+        let filter = low_pass(cutoff_hz, log.rate_hz)?;
         let n = log.samples();
         let reach = (2.0 * log.rate_hz / cutoff_hz).ceil() as usize;
         let bad: Vec<bool> = usable.iter().map(|u| !u).collect();
@@ -111,16 +112,22 @@ impl Samples {
             .zip(moves)
             .map(|((joint, effort), moves)| {
                 let [position, effort] = forward_backward_in_step(&filter, [&joint.position, effort])?;
+                // Of signals as long as the log no more are held at a time than need be.
+                let effort = pick(&effort);
                 let velocity = central(&position, log.rate_hz)?;
-                let acceleration = central(&velocity, log.rate_hz)?;
+                let position = pick(&position);
+                let acceleration = |k: &usize| {
+                    let mut at = [0.0];
+                    central_part(&velocity, log.rate_hz, *k..*k + 1, &mut at);
+                    at[0]
+                };
                 let reversing = near_reversal(&velocity, REVERSAL * rms(&velocity));
                 let reversing = dilate(&reversing, reach / 4);
                 Ok(JointSamples {
-                    position: pick(&position),
+                    position,
+                    acceleration: kept.iter().map(acceleration).collect(),
                     velocity: pick(&velocity),
-                    acceleration: pick(&acceleration),
-                    effort: pick(&effort),
-                    whole_effort: Arc::new(effort),
+                    effort,
                     // At rest friction has any value, and rows would weigh as much as the effort is steady.
                     sliding: kept.iter().map(|k| *moves && !reversing[*k]).collect(),
                     moves: *moves,

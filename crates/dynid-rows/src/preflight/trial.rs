@@ -3,13 +3,14 @@
 use std::borrow::Cow;
 
 use dynid_model::EffortModel;
-use dynid_motion::UniformLog;
+use dynid_motion::filter::forward_backward;
 use dynid_motion::shift::shift;
+use dynid_motion::{SignalError, UniformLog};
 use rayon::prelude::*;
 
 use super::refine::{self, GaussianPrior};
 use super::rows::{TrialRows, regressor};
-use super::samples::Samples;
+use super::samples::{Samples, low_pass};
 use super::wiring::Wiring;
 use dynid_estimate::consistent::{Problem, Settings, estimate};
 use dynid_factor::factor::{Factor, FactorError};
@@ -74,6 +75,16 @@ impl Trial<'_> {
         let efforts: Vec<&[f64]> = shifted.iter().map(|effort| effort.values.as_slice()).collect();
         let moved = Samples::filtered(self.log, &efforts, &usable, self.moves, self.samples.cutoff_hz);
         moved.ok().flatten().map(Cow::Owned)
+    }
+
+    /// The effort of a joint as [`Trial::samples_at`] has it, at every sample of the log.
+    pub(super) fn whole_effort(&self, joint: usize, delay_s: f64) -> Result<Vec<f64>, SignalError> {
+        let effort = &self.log.joints[joint].effort;
+        let filter = low_pass(self.samples.cutoff_hz, self.log.rate_hz)?;
+        match delay_s {
+            0.0 => forward_backward(&filter, effort),
+            _ => forward_backward(&filter, &shift(effort, -delay_s * self.log.rate_hz)?.values),
+        }
     }
 
     /// How badly bodies that can exist, with friction that takes energy, explain efforts: `min ‖R x - z‖² + ρ²` plus the
