@@ -3,7 +3,7 @@
 //! A [`Log`] is what was recorded; [`clock`] puts it on a uniform grid; [`spikes`] removes single outliers;
 //! [`spectrum`] finds the sensor noise and the excited band, and [`cutoff`] the cut-off frequencies they allow;
 //! [`filter`], [`difference`], [`kernel`] and [`shift`] form states, regression rows and delays; [`mask`] says which
-//! samples may be used. [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
+//! samples may be used. [`turns`] takes out full turns, [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
 //! [`trajectory`] holds the excitation trajectories. For motions that repeat:
 //! [`repetition`] finds after what time, [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics,
 //! [`savitzky_golay`] polynomials over any window, and [`response`] is what linear systems make of them.
@@ -37,6 +37,7 @@ pub mod spectrum;
 pub mod spikes;
 pub mod temperature;
 pub mod trajectory;
+pub mod turns;
 pub mod velocity;
 
 pub use clock::{ClockError, ClockReport, ClockSettings, UniformLog};

@@ -90,6 +90,11 @@ pub fn quantum(signal: &[f64]) -> f64 {
     if smallest.is_finite() { smallest } else { 0.0 }
 }
 
+/// Largest absolute value; 0 for an empty signal.
+pub fn largest(signal: &[f64]) -> f64 {
+    signal.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
 /// Root mean square; 0 for an empty signal.
 pub fn rms(signal: &[f64]) -> f64 {
     if signal.is_empty() {

@@ -6,6 +6,7 @@ use dynid_logs::columns::EffortColumn;
 use dynid_logs::{ColumnMapping, ReadingNote, Signals, TrajectoryFile};
 use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, RobotModel};
+use dynid_motion::signal::largest;
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Portion};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, prepare};
@@ -350,7 +351,7 @@ pub const LARGEST_POSITION: f64 = 1e6;
 
 fn check_reach(signals: &Signals, file: &str) -> Result<(), Error> {
     for (joint, position) in signals.joints.iter().zip(&signals.position) {
-        let largest = position.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let largest = largest(position);
         if largest > LARGEST_POSITION {
             let (file, joint) = (file.to_owned(), joint.clone());
             return Err(Error::FarPosition { file, joint, limit: LARGEST_POSITION, largest });
