@@ -125,7 +125,7 @@ def test_a_fleet_is_that_of_the_program(prepared: Prepared) -> None:
     for name, file in ((None, "type.json"), (change["robot"], f"robots/{change['robot']}.json")):
         estimate = found.estimate(name)
         assert without_command(estimate.to_json()) == without_command((prepared.folder / "whole" / file).read_text())
-    names, covariance = estimate.covariance()
+    names, covariance = estimate.covariance
     assert covariance.shape == (len(names), len(names)) and f"{change['parameter']}" in names
     with pytest.raises(KeyError):
         found.estimate("r999")

@@ -313,7 +313,7 @@ fn cases() -> Vec<Case> {
         (
             "fleet",
             "fleet factors --out f",
-            &["--between-robots fc", "--between-logs fv", "--robot r002", "--json"],
+            &["--between-robots fc", "--between-logs fv", "--robot r002", "--all-robots", "--json"],
         ),
         (
             "fleet",
@@ -321,6 +321,7 @@ fn cases() -> Vec<Case> {
             &["--covariates temperature", "--quiet"],
         ),
         ("fleet", "fleet factors --out mine", &["--force"]),
+        ("reduce", "reduce arm.urdf --log log.csv --out f.factors", &["--delays"]),
         (
             "inspect",
             "inspect arm.urdf",
