@@ -301,10 +301,8 @@ impl VirtualFleet {
             let joint = log.joints.iter().position(|joint| joint == parts(parameter).0);
             if let Some(effort) = joint.map(|j| &mut log.effort[j]) {
                 // The effort runs ahead of the motion.
-                let Ok(led) = shift(effort, delay * self.settings.rate_hz) else {
-                    unreachable!("simulated efforts are finite")
-                };
-                *effort = led.values;
+                let led = shift(effort, delay * self.settings.rate_hz);
+                *effort = led.map_err(|e| Error::setting("fleet.delays", "finite efforts", e))?.values;
             }
         }
         Ok(log)
