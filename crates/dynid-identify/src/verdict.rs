@@ -484,7 +484,7 @@ fn blocks(id: &Identification) -> CheckResult {
             "standard deviations come from leaving out one robot at a time, so what differs between robots and what colours residuals is covered"
         }
         Basis::Fleet => {
-            "standard deviations are those of the mixed model of the fleet: this robot's own logs, and how robots of its type differ"
+            "standard deviations are those of the mixed model of the fleet: what logs say, and how robots of the type differ"
         }
     };
     let robots = fitted.robots;

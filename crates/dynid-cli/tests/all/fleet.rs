@@ -171,6 +171,53 @@ fn models_of_robots_are_those_of_today() {
     }
 }
 
+/// An effort that is noise tells nothing of its joint: the fleet says so, and its models do not count it.
+#[test]
+fn an_effort_that_is_noise_is_said_to_be() {
+    let at = prepared();
+    std::fs::create_dir_all(at.join("noise")).unwrap();
+    let config = "robot = \"arm.urdf\"\npreflight = \"off\"\n[[log]]\npath = \"made/logs/r001-001.csv.gz\"\n";
+    std::fs::write(at.join("unexamined.toml"), config).unwrap();
+    run(at, &["reduce", "unexamined.toml", "--out", "unexamined.factors", "--quiet"], 0);
+    let (mut manifest, mut state) = ("log,robot\n".to_owned(), 1_u64);
+    for (robot, log) in (1..=4).flat_map(|robot| (1..=3).map(move |log| (robot, log))) {
+        let name = format!("noise/r{robot:03}-{log:03}.csv");
+        run(at, &["convert", &format!("made/logs/r{robot:03}-{log:03}.csv.gz"), &name, "--quiet"], 0);
+        let text = std::fs::read_to_string(at.join(&name)).unwrap();
+        let mut lines = text.lines();
+        let head = lines.next().unwrap();
+        let column = head.split(',').position(|name| name == "tau_elbow").unwrap();
+        let mut noisy = format!("{head}\n");
+        for line in lines {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let noise = format!("{}", (state >> 40) as f64 / (1_u64 << 24) as f64 - 0.5);
+            let mut cells: Vec<&str> = line.split(',').collect();
+            cells[column] = &noise;
+            noisy += &format!("{}\n", cells.join(","));
+        }
+        std::fs::write(at.join(&name), noisy).unwrap();
+        manifest += &format!("{name},r{robot:03}\n");
+    }
+    std::fs::write(at.join("noise.csv"), manifest).unwrap();
+    run(
+        at,
+        &["reduce", "unexamined.factors", "--manifest", "noise.csv", "--out", "noise.folder", "--quiet"],
+        0,
+    );
+    run(at, &["fleet", "noise.folder", "--all-robots", "--out", "of-noise", "--quiet"], 0);
+    let found = result("of-noise");
+    assert_eq!(found["status"], "warn");
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("the effort of elbow is mostly something else"), "{warnings}");
+    assert!(!warnings.contains("the effort of shoulder"), "{warnings}");
+    for file in ["type.json", "robots/r002.json"] {
+        let estimate = read(&at.join("of-noise").join(file));
+        assert_eq!(estimate["verdict"]["status"], "fail", "{file}");
+        let (_, friction) = parameters(&estimate).find(|(name, _)| *name == "elbow.fc").unwrap();
+        assert_eq!(friction["verdict"], "carried by the prior", "{file}");
+    }
+}
+
 /// A delay that grows in one robot is found where factors have columns for it, and friction is not blamed for it.
 #[test]
 fn delays_that_change_are_found() {

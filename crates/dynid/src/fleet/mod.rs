@@ -14,7 +14,9 @@ mod record;
 mod report;
 mod store;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 
 use dynid_fleet::drift::{Change, Drift, DriftSettings, History, drift};
 use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, RobotFit, fit};
@@ -182,6 +184,8 @@ pub struct FleetResult {
     pub failures: Vec<Failure>,
     /// Robots that have changed, at their last log.
     now: Vec<Option<RobotFit>>,
+    /// The fit without efforts that are not explained, by which are: as models ask for it.
+    without: Mutex<BTreeMap<Vec<bool>, Arc<FleetFit>>>,
     robot_outliers: Vec<Outlier>,
     log_outliers: Vec<Outlier>,
     built: Built,
@@ -228,6 +232,7 @@ pub fn fleet(
     }
     Ok(FleetResult {
         now,
+        without: Mutex::default(),
         robot_outliers: found.robot_outliers(settings.false_discoveries),
         log_outliers: found.log_outliers(settings.false_discoveries),
         fit: found,

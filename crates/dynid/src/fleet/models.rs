@@ -4,6 +4,7 @@
 //! place of time blocks. A robot is what its logs and the fleet make of it, `N(x_r, C_x)`, with what all share as the type has it.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, PoisonError};
 
 use dynid_estimate::metrics::FitSums;
 use dynid_factor::Factor;
@@ -13,8 +14,8 @@ use dynid_identify::Identification;
 use dynid_identify::caution::{self, Caution};
 use dynid_identify::preflight::Finding;
 use dynid_identify::reduction::{LogFacts, Pooled, TrainedLog};
-use dynid_linalg::Mat;
 use dynid_linalg::triangular::solve_lower_in_place;
+use dynid_linalg::{Cholesky, Mat};
 use dynid_record::Basis;
 use rayon::prelude::*;
 
@@ -26,7 +27,7 @@ use crate::estimate::Estimate;
 /// Share of its prior weight that a type has in each of its robots: enough to split what base values leave open as it is split in the type
 /// (the solver stops at 1e-6), and too little to draw a second time at what logs tell.
 const SPLIT: f64 = 1e-2;
-/// What rounding may take from the smallest eigenvalue of a matrix of correlations.
+/// What rounding takes from the smallest eigenvalue of a matrix of correlations at least.
 const ROUNDING: f64 = 1e-12;
 /// Where the pages and records of a fleet tell more.
 const LOOK: &str = "`fleet.json` and the page of the fleet tell which robots and logs";
@@ -42,7 +43,10 @@ impl FleetResult {
         let name = format!("{} logs of {} robots", logs.len(), self.fleet.robots.len());
         let mut pooled = self.pooled(&name, &logs, &self.fit.values, Basis::Robots);
         let without = self.without_unexplained(&pooled)?;
-        let fit = without.as_ref().unwrap_or(&self.fit);
+        let fit = without.as_deref().unwrap_or(&self.fit);
+        if fit.jackknife.is_none() {
+            pooled.basis = Basis::Fleet;
+        }
         let said = fit.said_by_robots().map_err(|error| self.fault(error))?;
         let delays: Vec<usize> = (self.recipe.columns.len()..self.fleet.columns).collect();
         let of_bodies = |(_, factor): (usize, Factor)| match &delays[..] {
@@ -76,12 +80,12 @@ impl FleetResult {
             (0..self.fleet.logs.len()).filter(|k| self.fleet.logs[*k].robot == r).collect();
         let name = format!("{} logs of {}", logs.len(), robot.name);
         let mut pooled = self.pooled(&name, &logs, &fitted.values, Basis::Fleet);
-        let without = match self.without_unexplained(&pooled)? {
-            Some(fit) => {
-                let changes = changes_of(self.drift.as_ref(), r);
+        let without = match (self.without_unexplained(&pooled)?, changes_of(self.drift.as_ref(), r)) {
+            (None, _) => None,
+            (Some(fit), []) => fit.robots[r].clone(),
+            (Some(fit), changes) => {
                 fit.robots_now(&self.fleet, &[(r, changes)]).map_err(|error| self.fault(error))?.remove(0)
             }
-            None => None,
         };
         let fitted = without.as_ref().unwrap_or(fitted);
         let p = self.recipe.columns.len();
@@ -122,14 +126,21 @@ impl FleetResult {
     }
 
     /// The fit without the rows of efforts that are mostly something else than the model; `None` where there are none.
-    fn without_unexplained(&self, pooled: &Pooled) -> Result<Option<FleetFit>, Error> {
+    fn without_unexplained(&self, pooled: &Pooled) -> Result<Option<Arc<FleetFit>>, Error> {
         let explained = pooled.explained();
         if explained.iter().all(|e| *e) {
             return Ok(None);
         }
+        // Robots mostly share what is not explained with their type. The lock is not held while a fit is made: its threads may take up another robot.
+        let known = || self.without.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known().get(&explained).cloned();
+        if found.is_some() {
+            return Ok(found);
+        }
         let scales = self.recipe.choices.scales_hz.len();
         let silent: Vec<bool> = (0..self.fleet.channels).map(|c| !explained[c / scales]).collect();
-        let fit = self.fit.without(&self.fleet, &silent).map_err(|error| self.fault(error))?;
+        let fit = Arc::new(self.fit.without(&self.fleet, &silent).map_err(|error| self.fault(error))?);
+        known().insert(explained, Arc::clone(&fit));
         Ok(Some(fit))
     }
 
@@ -144,7 +155,7 @@ impl FleetResult {
     }
 
     /// Figures of logs, each at its own values; blocks and covariance are left empty.
-    fn pooled(&self, name: &str, logs: &[usize], values: &[f64], basis: Basis) -> Pooled {
+    pub(super) fn pooled(&self, name: &str, logs: &[usize], values: &[f64], basis: Basis) -> Pooled {
         let (outputs, scales) = (self.recipe.outputs.len(), self.recipe.choices.scales_hz.len());
         let p = self.recipe.columns.len();
         let mut left = vec![(0, 0.0); outputs * scales];
@@ -191,12 +202,8 @@ impl FleetResult {
 /// Values `x` of covariance `c`, those of the shared columns given.
 fn given_shared(x: &[f64], c: &Mat, shared: &[usize], values: &[f64]) -> Vec<f64> {
     let n = shared.len();
-    let sd: Vec<f64> = shared.iter().map(|i| c[(*i, *i)].sqrt()).collect();
-    let correlation = correlation(&sd, |i, j| c[(shared[i], shared[j])]);
-    let moved = Mat::from_fn(n, 1, |i, _| (values[shared[i]] - x[shared[i]]) / sd[i]);
-    let Some(moved) = correlation.cholesky().map(|factor| factor.solve(&moved)) else {
-        unreachable!("correlations and what rounding takes from them")
-    };
+    let (sd, root) = correlation(n, |i, j| c[(shared[i], shared[j])]);
+    let moved = root.solve(&Mat::from_fn(n, 1, |i, _| (values[shared[i]] - x[shared[i]]) / sd[i]));
     let mut out = x.to_vec();
     for (i, x) in out.iter_mut().enumerate() {
         match shared.binary_search(&i) {
@@ -210,21 +217,32 @@ fn given_shared(x: &[f64], c: &Mat, shared: &[usize], values: &[f64]) -> Vec<f64
 /// Rows of unit variance whose least squares are `x`, with covariance `c`.
 fn around(x: &[f64], c: &Mat, rows: usize) -> Factor {
     let p = x.len();
-    let sd: Vec<f64> = (0..p).map(|i| c[(i, i)].sqrt()).collect();
-    let Some(root) = correlation(&sd, |i, j| c[(i, j)]).cholesky() else {
-        unreachable!("correlations and what rounding takes from them")
-    };
+    let (sd, root) = correlation(p, |i, j| c[(i, j)]);
     let mut inverse = Mat::from_fn(p, p, |i, j| if i == j { sd[i].recip() } else { 0.0 });
     solve_lower_in_place(&root.lower(), &mut inverse);
     let effort = inverse.times(x);
     Factor::from_triangle(p, |i, j| if j < p { inverse[(i, j)] } else { effort[i] }, 0.0, rows)
 }
 
-fn correlation(sd: &[f64], covariance: impl Fn(usize, usize) -> f64) -> Mat {
-    Mat::from_fn(sd.len(), sd.len(), |i, j| {
-        let own = if i == j { ROUNDING } else { 0.0 };
-        covariance(i, j) / (sd[i] * sd[j]) + own
-    })
+/// Standard deviations of a covariance, and the root of its correlations.
+///
+/// A covariance is a difference where a prior is weak, of robots out of the spread and of changes, and loses digits there: what is short of a
+/// positive definite matrix is added to the diagonal, which makes variances larger, never smaller.
+fn correlation(n: usize, covariance: impl Fn(usize, usize) -> f64) -> (Vec<f64>, Cholesky) {
+    let sd: Vec<f64> = (0..n).map(|i| covariance(i, i).max(f64::MIN_POSITIVE).sqrt()).collect();
+    let mut share = ROUNDING;
+    loop {
+        let entry = |i: usize, j: usize| match i == j {
+            true => 1.0 + share,
+            // What is no correlation, or no number, is none.
+            false => Some(covariance(i, j) / (sd[i] * sd[j])).filter(|r| r.abs() <= 1.0).unwrap_or(0.0),
+        };
+        if let Some(root) = Mat::from_fn(n, n, entry).cholesky() {
+            return (sd, root);
+        }
+        // Beyond `n` the diagonal outweighs all else: the loop ends.
+        share *= 10.0;
+    }
 }
 
 /// What speaks against taking the model of a robot as it is.
@@ -309,4 +327,36 @@ fn first_of_a_kind<T>(
     }
     kinds.iter_mut().filter(|(_, more)| *more > 0).for_each(|(first, more)| told(first, *more));
     kinds.into_iter().map(|(first, _)| first).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Covariances that lost their digits to a weak prior, or that are none, make no panic; sound ones are taken as they are.
+    #[test]
+    fn rows_stand_for_a_covariance_whatever_rounding_left_of_it() {
+        let sound = Mat::from_fn(2, 2, |i, j| if i == j { [4.0, 1e-6][i] } else { 1e-3 });
+        let x = [1.0, -2.0];
+        let factor = around(&x, &sound, 10);
+        for (found, expected) in factor.solve().iter().zip(x) {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+        let r = factor.r_matrix();
+        let information = (r.transpose() * &r).lu().inverse();
+        for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+            let (found, expected) = (information[(i, j)], sound[(i, j)]);
+            assert!((found - expected).abs() < 1e-8 * expected, "{found} {expected}");
+        }
+        // Correlations of 1 beside one of -1, a variance below zero, no number.
+        let indefinite =
+            Mat::from_fn(3, 3, |i, j| if (i, j) == (0, 2) || (i, j) == (2, 0) { -1.0 } else { 1.0 });
+        let negative = Mat::from_fn(2, 2, |i, j| if i == j { [1.0, -1e-20][i] } else { 0.0 });
+        let none = Mat::from_fn(2, 2, |_, _| f64::NAN);
+        for c in [indefinite, negative, none] {
+            let n = c.nrows();
+            assert!(around(&vec![0.0; n], &c, 10).effort_norm().is_finite());
+            assert_eq!(given_shared(&vec![0.0; n], &c, &[], &vec![0.0; n]), vec![0.0; n]);
+        }
+    }
 }

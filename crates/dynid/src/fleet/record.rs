@@ -6,7 +6,7 @@ use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
 use dynid_fleet::{FEW, Noise};
 use dynid_identify::reduction::DELAY;
-use dynid_record::{Outcome, words};
+use dynid_record::{Basis, Outcome, words};
 use serde::{Deserialize, Serialize};
 
 use super::failure::Failure;
@@ -567,6 +567,14 @@ impl FleetResult {
         let told = self.noise();
         for output in self.recipe.outputs.iter().filter(|o| told.iter().all(|c| c.output != o.name)) {
             out.push(format!("efforts of {} are zero in all logs: they tell nothing", output.name));
+        }
+        let all: Vec<usize> = (0..self.fleet.logs.len()).collect();
+        let explained = self.pooled("all logs", &all, &fit.values, Basis::Robots).explained();
+        for (output, _) in self.recipe.outputs.iter().zip(explained).filter(|(_, explained)| !explained) {
+            out.push(format!(
+                "the effort of {} is mostly something else than the model (poor current sensing, friction at rest, a wrong column?): its parameters, and changes of them, mean nothing",
+                output.name
+            ));
         }
         for channel in told.iter().filter(|c| c.colour > COLOURED) {
             out.push(format!(
