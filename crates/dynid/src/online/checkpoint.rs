@@ -16,7 +16,7 @@ use super::samples::Samples;
 use super::usual::Innovations;
 use crate::Error;
 
-const SCHEMA: &str = "dynid-online-checkpoint/2";
+const SCHEMA: &str = "dynid-online-checkpoint/3";
 
 /// State of a session after whole rows. Goes on with the same bits as a session that was never interrupted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]

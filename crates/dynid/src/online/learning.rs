@@ -16,7 +16,7 @@ use dynid_rows::conditioning::{
 
 use super::asked::Asked;
 use super::samples::Sample;
-use super::usual::Innovations;
+use super::usual::{EXTENTS, Innovations};
 use crate::elements::ElementPlan;
 use crate::log::{self, LogAxis};
 use crate::pipeline::stated_values;
@@ -164,7 +164,7 @@ impl Learned {
             && positive(&self.prior_std)
             && finite(&self.efforts)
             && finite(&self.noise)
-            && self.innovations.size.len() == outputs
+            && self.innovations.size.len() == outputs * EXTENTS
             && positive(&self.innovations.size)
             && positive(&[self.innovations.inflation])
             && self.innovations.every > 0

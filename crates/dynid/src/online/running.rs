@@ -80,7 +80,13 @@ impl Running {
             let name = format!("{joint}.fv");
             structure.base.kept.iter().position(|column| names[*column].name == name)
         };
-        let speeds = structure.model.outputs().iter().map(|output| speed_of(&output.name)).collect();
+        // A column whose part in the effort is below the noise whatever its parameter.
+        let unseen = |o: usize| {
+            let noise = learned.noise[o * outputs + o].sqrt().max(f64::MIN_POSITIVE);
+            learned.prior_std.iter().map(|std| noise / std).collect::<Vec<f64>>()
+        };
+        let axes = structure.model.outputs().iter().enumerate();
+        let axes = axes.map(|(o, output)| (speed_of(&output.name), unseen(o))).collect();
         let settings = settings(asked, &learned, outputs, rows.spacing_s(), true);
         let window = Settings {
             prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
@@ -104,7 +110,7 @@ impl Running {
             newest: f64::NEG_INFINITY,
             next_report: None,
             hold: None,
-            ground: Ground::new(speeds, settling, block),
+            ground: Ground::new(axes, settling, block),
             counts: Counts::default(),
             waiting: Vec::new(),
             estimator,
@@ -159,7 +165,7 @@ impl Running {
         for row in std::mem::take(&mut self.waiting) {
             let Some((used, effort)) = self.load(&row) else { continue };
             let noise = self.noise(&used);
-            self.ground.visit(&used, &self.regressor);
+            self.ground.learn_from(&used, &self.regressor);
             self.estimator.step(&self.regressor, &effort, RowNoise::Covariance(&noise))?;
             usual.push(&used, self.estimator.innovation().whitened());
             taken.push((used, effort, self.regressor.clone()));
@@ -185,6 +191,7 @@ impl Running {
         }
         self.regressor.clear();
         used.iter().for_each(|o| self.regressor.extend_from_slice(&row.columns[*o]));
+        self.ground.enter(&used, &self.regressor);
         let effort = used.iter().map(|o| row.effort[*o]).collect();
         self.counts.rows += 1;
         Some((used, effort))
@@ -193,8 +200,8 @@ impl Running {
     /// Covariance of the rows of some outputs, of the size that is usual.
     fn noise(&self, used: &[usize]) -> Vec<f64> {
         let outputs = self.errors.len();
-        let size = &self.learned.innovations.size;
-        let of = |i: usize, j: usize| self.learned.noise[i * outputs + j] * (size[i] * size[j]).sqrt();
+        let size = |output: usize| self.learned.innovations.size(output, self.ground.extent(output));
+        let of = |i: usize, j: usize| self.learned.noise[i * outputs + j] * (size(i) * size(j)).sqrt();
         used.iter().flat_map(|i| used.iter().map(move |j| of(*i, *j))).collect()
     }
 

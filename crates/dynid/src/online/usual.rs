@@ -7,10 +7,13 @@ const SETTLING: f64 = 0.3;
 /// Fewest innovations of an output that say anything.
 const FEWEST: usize = 20;
 
+/// How far motions go, in steps: within what was learned from, then by half octaves beyond it.
+pub(super) const EXTENTS: usize = 17;
+
 /// Usual innovations of a stream, relative to the noise of its rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Innovations {
-    /// Per output: mean square of the whitened innovations in the worst block, at least 1.
+    /// Output by output, by how far the motion goes ([`EXTENTS`]): mean square of the whitened innovations in the worst block, at least 1.
     pub(super) size: Vec<f64>,
     /// Correlation time, samples of rows: first lag at which no output's autocorrelation is more than negligible.
     pub(super) every: usize,
@@ -21,7 +24,19 @@ pub(super) struct Innovations {
 impl Innovations {
     /// White, and of the size that was stated.
     pub(super) fn stated(outputs: usize) -> Innovations {
-        Innovations { size: vec![1.0; outputs], every: 1, inflation: 1.0 }
+        Innovations { size: vec![1.0; outputs * EXTENTS], every: 1, inflation: 1.0 }
+    }
+
+    /// Size of an output's innovations where the motion goes so far.
+    pub(super) fn size(&self, output: usize, extent: usize) -> f64 {
+        self.size[output * EXTENTS + extent]
+    }
+
+    /// A block of an output's innovations was `factor` times as large as usual. Where the motion goes further they are no smaller.
+    pub(super) fn grow(&mut self, output: usize, extent: usize, factor: f64) {
+        let sizes = &mut self.size[output * EXTENTS..][..EXTENTS];
+        let found = sizes[extent] * factor.max(1.0);
+        sizes[extent..].iter_mut().for_each(|size| *size = size.max(found));
     }
 }
 
@@ -60,7 +75,7 @@ impl UsualInnovations {
                 .filter_map(|chunk| mean_square(chunk, FEWEST.min(block.div_ceil(2))))
                 .chain(mean_square(settled, 1))
                 .fold(1.0, f64::max);
-            out.size[output] = worst;
+            out.grow(output, 0, worst);
             let (time, inflation) = correlation(settled, present);
             out.every = out.every.max(time);
             out.inflation = out.inflation.max(inflation);
@@ -121,7 +136,8 @@ mod tests {
         let found = usual.learned(100);
         assert!((6..=14).contains(&found.every), "{found:?}");
         assert!((found.inflation - 9.0).abs() < 2.5, "{found:?}");
-        assert!(found.size[1] > 6.0 && found.size[0] < 2.5, "{found:?}");
+        assert!(found.size(1, 0) > 6.0 && found.size(0, 0) < 2.5, "{found:?}");
+        assert_eq!(found.size(1, EXTENTS - 1), found.size(1, 0));
         assert_eq!(UsualInnovations::new(1).learned(10), Innovations::stated(1));
     }
 }
