@@ -23,6 +23,9 @@ const EXPLAINED: f64 = 0.2;
 /// Share of the efforts below which what is left may as well be a law of friction that the model does not have: what comes in any amount
 /// then improves it by chance, and is no error.
 const BEARABLE: f64 = 0.1;
+/// Under its right clock a log is explained by bodies nearly as well as by any numbers. A clock is no explanation where any numbers leave less
+/// than this share of its misfit as logged.
+const LOOSENED: f64 = 0.6;
 /// Gravity this close to the direction stated is a base that is not level, rad; what is farther off is mounted another way.
 const SLIGHT: f64 = 0.18;
 /// Gravity this close to the direction stated differs in its size alone, rad.
@@ -66,13 +69,27 @@ pub(super) fn wiring(
             Rewiring::Gravity(g) if angle(*g, gravity) < SAME_DIRECTION => FindingId::GravitySize,
             _ => id,
         };
-        let evidence = format!(
+        // Another clock severs inertia from gravity, so that it may stand for what the model lacks.
+        let loosens = matches!(found.change, Rewiring::Clock(_))
+            && shown.is_none()
+            && search.unrestrained < LOOSENED * found.after;
+        let mut evidence = format!(
             "bodies that can exist leave {:.3} % of the efforts unexplained as the log is, {:.3} % {what}{}",
             share(found.before),
             share(found.after),
             alternatives(found, names)
         );
+        if loosens {
+            evidence += &format!(
+                "; numbers that no body can have leave {:.3} % as the log is",
+                share(search.unrestrained)
+            );
+        }
         let remedy = match id {
+            FindingId::ClockRate if loosens => {
+                "if the rate of the log is right, something acts that the robot file does not hold, such as a gravity compensator (`spring`), a load, \
+                 or motors that turn several joints; else state the unit of the time"
+            }
             FindingId::JointPermutation => "assign the columns in this order",
             FindingId::EffortSign => "reverse the sign of the effort",
             FindingId::PositionSign => {
@@ -95,7 +112,7 @@ pub(super) fn wiring(
             _ => "state the unit or the drive gain of the effort",
         };
         let unclear;
-        let remedy = match clear {
+        let remedy = match clear || loosens {
             true => remedy,
             false => {
                 unclear = format!("see what it is, since the log does not tell for sure, then: {remedy}");
@@ -108,10 +125,10 @@ pub(super) fn wiring(
                 found.before < BEARABLE * BEARABLE * search.nothing
             }
             _ => false,
-        };
+        } || loosens;
         let severity = if slight { Severity::Warning } else { Severity::Error };
         let finding = out.add(id, severity, joint.as_deref(), evidence, remedy);
-        if clear && k + 1 == search.found.len() {
+        if clear && !loosens && k + 1 == search.found.len() {
             finding.fixes = fixes(search, velocities, rate_hz);
         }
     }

@@ -30,6 +30,9 @@ const CLOCKS: [f64; 8] = [1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9, 60.0, 1.0 / 60.0];
 const CLOCK_STEPS: i32 = 6;
 /// Least change of the clock that is looked for in the efforts alone, natural logarithm.
 const LEAST_CLOCK: f64 = 0.3;
+/// Sample rates that logs have, Hz, and greatest speeds of their joints, rad/s or m/s.
+const RATES: [f64; 2] = [0.5, 20_000.0];
+const SPEEDS: [f64; 2] = [1e-3, 60.0];
 /// Longest delay, s, and as a share of the record.
 const LONGEST_DELAY: (f64, f64) = (1.5, 0.125);
 /// Delays are looked at in such steps, s.
@@ -145,10 +148,26 @@ impl Look<'_> {
         }
         let steps = (-CLOCK_STEPS..=CLOCK_STEPS).filter(|k| *k != 0);
         let factors = CLOCKS.into_iter().chain(steps.map(|k| 10f64.powf(0.25 * f64::from(k))));
+        let factors = factors.filter(|factor| self.is_a_clock(*factor));
         let Some(best) = self.best(factors.map(by).collect())? else { return Ok(Vec::new()) };
         let refined = self.refined(&best, Unknown::Clock)?;
-        let found = refined.iter().chain([&best]).map(|w| w.clock).filter(|c| c.ln().abs() > LEAST_CLOCK);
-        Ok(found.map(|c| Rewiring::Clock(as_a_clock(c))).collect())
+        let found = refined.iter().chain([&best]).map(|w| as_a_clock(w.clock));
+        let other = |c: &f64| c.ln().abs() > LEAST_CLOCK && self.is_a_clock(*c);
+        Ok(found.filter(other).map(Rewiring::Clock).collect())
+    }
+
+    /// Whether rate and speeds that are possible as logged are so under another clock. Much faster clocks sever inertia from gravity, and so
+    /// free bodies of what they owe each other: whatever is missing in the model is then explained better.
+    fn is_a_clock(&self, factor: f64) -> bool {
+        let joints = self.wiring.position.iter().map(|source| {
+            let velocity = &self.samples.joints[source.joint].velocity;
+            velocity.iter().fold(0.0_f64, |most, v| most.max((source.factor * v).abs()))
+        });
+        let fastest = joints.fold(0.0, f64::max);
+        [(self.samples.rate_hz, RATES), (fastest, SPEEDS)].into_iter().all(|(as_logged, [low, high])| {
+            let within = |x: f64| (low..=high).contains(&x);
+            within(as_logged / factor) || !within(as_logged)
+        })
     }
 
     /// Delays at which the efforts fit the motion far better than at none: local minima of what linear parameters leave.

@@ -51,6 +51,8 @@ pub struct WiringSearch {
     pub found: Vec<Found>,
     /// Misfit of the log as it is.
     pub as_logged: f64,
+    /// What the log as it is would leave if parameters were any numbers, not those of bodies that can exist near the prior.
+    pub unrestrained: f64,
     /// Misfit that explaining nothing at all would have.
     pub nothing: f64,
 }
@@ -79,6 +81,7 @@ impl Trial<'_> {
             self.rows(&samples, &wiring)?.weighted(&wiring)
         };
         let (as_logged, nothing) = (self.misfit(&factor), factor.effort_norm().powi(2));
+        let unrestrained = factor.rho().powi(2);
         let mut found: Vec<Found> = Vec::new();
         let mut now = as_logged;
         for _ in 0..2 * joints.max(2) {
@@ -141,7 +144,7 @@ impl Trial<'_> {
             now = after;
         }
         self.drop_refuted(&mut found, now);
-        Ok(WiringSearch { wiring, found, as_logged, nothing })
+        Ok(WiringSearch { wiring, found, as_logged, unrestrained, nothing })
     }
 
     /// Drops alternatives of earlier differences that do not explain the log together with the later ones.

@@ -5,6 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use dynid::check::{FindingId, Severity, check};
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::{Estimate, Split};
 use dynid::identify;
@@ -77,6 +78,29 @@ scale = { a4 = 221.0, a5 = 239.619047619, a6 = 154.323134328 }
 
 fn of<'a>(all: &'a [JointStiffness], joint: &str) -> &'a JointStiffness {
     all.iter().find(|s| s.joint == joint).unwrap()
+}
+
+/// The same machine as a rigid one, from its motors: what its log has besides bodies (friction that builds up while it creeps from rest, wrists that
+/// share motors) is no fault of the clock.
+#[test]
+fn a_kr300_of_rigid_joints_is_not_refused() {
+    let Some(data) = data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (rigid, _) = KR300.split_once("[element.a1]").unwrap();
+    std::fs::write(folder.path().join("robot.toml"), rigid).unwrap();
+    let log = data.join("kuka-kr300/run_a.csv.gz");
+    let gears = "{ a1 = 256.857142857, a2 = 267.428571429, a3 = 252.333333333, a4 = 221.0, a5 = 239.619047619, a6 = 154.323134328 }";
+    let text = format!(
+        "robot = \"robot.toml\"\n[columns]\nposition = {{ columns = {{ {} }} }}\neffort = {{ columns = {{ {} }}, scale = {gears} }}\n[[log]]\npath = {log:?}\n",
+        (1..=6).map(|k| format!("a{k} = \"qm{k}\"")).collect::<Vec<_>>().join(", "),
+        (1..=6).map(|k| format!("a{k} = \"tau_motor{k}\"")).collect::<Vec<_>>().join(", "),
+    );
+    let path = folder.path().join("run.toml");
+    std::fs::write(&path, text).unwrap();
+    let found = check(&Config::read(&path).unwrap(), &mut |_| {}).unwrap();
+    println!("{:#?}", found.findings);
+    assert!(found.findings.iter().all(|f| f.severity != Severity::Error));
+    assert!(found.findings.iter().all(|f| f.id != FindingId::ClockRate || f.fixes.is_empty()));
 }
 
 #[test]
