@@ -32,6 +32,18 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// Adds estimators that were run on the same folds behind those that are here.
+    ///
+    /// # Panics
+    /// If the folds are others.
+    pub fn append(&mut self, further: Comparison) {
+        assert_eq!(self.folds.len(), further.folds.len(), "the folds are the same");
+        for (own, further) in self.folds.iter_mut().zip(further.folds) {
+            assert_eq!(own.held_out, further.held_out, "the folds are the same");
+            own.squares.extend(further.squares);
+        }
+    }
+
     /// Root mean square residual of an estimator on an output over all folds, in the effort's unit; `None` without rows.
     pub fn rms(&self, estimator: usize, output: usize) -> Option<f64> {
         let rows: usize = self.folds.iter().map(|f| f.rows[output]).sum();

@@ -43,7 +43,8 @@ pub use loops::{ClosureKind, ClosureRecord, FrameRecord, LoopsRecord};
 pub use model::{CouplingRecord, JointRecord, JointType, LinkRecord, ModelRecord, SettingRecord};
 pub use reading::{MotorSide, ReadingRecord};
 pub use trust::{
-    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
+    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PriorTrialRecord, PruningRecord, PruningStep,
+    WhitenessRecord,
 };
 
 /// Version of the file's layout.

@@ -170,6 +170,16 @@ words! {
 }
 
 words! {
+    /// How distance from the robot file is measured in directions that the logs do not show.
+    PriorDistance {
+        /// Squared, in units of the prior's standard deviations.
+        Quadratic = "quadratic",
+        /// Entropic (Bregman log-det) divergence of pseudo-inertias.
+        Entropic = "entropic",
+    }
+}
+
+words! {
     /// How the search for consistent parameters ended.
     ConsistencyStatus {
         /// No constraint matters: the best fit is consistent by itself.

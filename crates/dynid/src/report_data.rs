@@ -17,7 +17,8 @@ use dynid_report::{Fact, Value};
 
 use crate::Error;
 use crate::agreement::Agreement;
-use crate::config::{Config, Method};
+use crate::config::{Config, Method, PriorDistance};
+use crate::consistency::PriorTrial;
 use crate::estimate::short_name;
 use crate::estimate::{Choice, Estimate, Provenance};
 use crate::pipeline::Identification;
@@ -305,7 +306,7 @@ impl Shown<'_> {
                     .collect(),
             });
         }
-        out.extend(self.prior_ladder());
+        out.extend(self.prior_ladders());
         if c.mask_trials.len() > 1 {
             out.push(report::Ladder {
                 title: "Reversal mask (the same for all joints)".to_owned(),
@@ -332,29 +333,34 @@ impl Shown<'_> {
         out
     }
 
-    fn prior_ladder(&self) -> Option<report::Ladder> {
+    fn prior_ladders(&self) -> Vec<report::Ladder> {
         let (trials, chosen) = (&self.consistent.prior_trials, self.consistent.chosen);
-        (trials.len() > 1).then(|| report::Ladder {
-            title: "Pull towards the robot file".to_owned(),
-            explanation: "Squared held-out error of the physically consistent parameters, relative to that without constraints \
-                          (mean over joints), when deviations from the robot file are weighted more or less. The strongest \
-                          pull within half a per cent of the least error is kept."
-                .to_owned(),
-            quantity: "weight".to_owned(),
-            unit: String::new(),
-            loss_name: "held-out loss, relative".to_owned(),
-            loss_unit: String::new(),
-            rungs: trials
-                .iter()
-                .enumerate()
-                .map(|(k, t)| report::Rung {
-                    value: Value::Number(t.weight),
-                    loss: t.loss,
-                    chosen: k == chosen,
-                    ..Default::default()
-                })
-                .collect(),
-        })
+        let of = |distance: PriorDistance, measured: &str| {
+            let trials: Vec<_> = trials.iter().enumerate().filter(|(_, t)| t.distance == distance).collect();
+            let rung = |(k, t): &(usize, &PriorTrial)| report::Rung {
+                value: Value::Number(t.weight),
+                loss: t.loss,
+                chosen: *k == chosen,
+                ..Default::default()
+            };
+            (trials.len() > 1).then(|| report::Ladder {
+                title: format!("Pull towards the robot file, {measured}"),
+                explanation: "Squared held-out error of the physically consistent parameters, relative to that without constraints \
+                              (mean over joints), when deviations from the robot file are weighted more or less. Of the distance \
+                              with the least error the strongest pull within half a per cent of it is kept."
+                    .to_owned(),
+                quantity: "weight".to_owned(),
+                unit: String::new(),
+                loss_name: "held-out loss, relative".to_owned(),
+                loss_unit: String::new(),
+                rungs: trials.iter().map(rung).collect(),
+            })
+        };
+        let ladders = [
+            of(PriorDistance::Quadratic, "squared deviations"),
+            of(PriorDistance::Entropic, "entropic divergence"),
+        ];
+        ladders.into_iter().flatten().collect()
     }
 
     fn delays(&self) -> Vec<report::JointDelay> {

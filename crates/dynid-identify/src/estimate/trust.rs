@@ -1,6 +1,6 @@
 //! What the result file says about consistency, precision and essential parameters.
 
-use dynid_record::{Basis, ConsistencyForm, ConsistencyStatus};
+use dynid_record::{Basis, ConsistencyForm, ConsistencyStatus, PriorDistance};
 use serde::{Deserialize, Serialize};
 
 use super::LogFit;
@@ -17,10 +17,12 @@ pub struct ConsistencyRecord {
     /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance, `price / (variance inflation ·
     /// base parameters)`; around 1 is no more than noise.
     pub price_over_chance: Option<f64>,
-    /// Weight of the distance from the robot file, as given or as large as held-out folds allow.
+    /// How the distance from the robot file is measured, as given or as held-out folds have it.
+    pub prior: PriorDistance,
+    /// Weight of that distance, as given or as large as held-out folds allow.
     pub prior_weight: f64,
-    /// Weights tried, each with its squared held-out error relative to that without constraints (mean over joints).
-    pub prior_trials: Vec<(f64, Option<f64>)>,
+    /// All that were tried.
+    pub prior_trials: Vec<PriorTrialRecord>,
     /// No consistent parameters (with whitened sizes up to ten times these) have an objective lower by more than this.
     pub gap: f64,
     /// Iterations of the interior-point method.
@@ -33,6 +35,17 @@ pub struct ConsistencyRecord {
     pub training_unconstrained: Vec<LogFit>,
     /// Figures of the parameters without constraints on the validation logs.
     pub validation_unconstrained: Vec<LogFit>,
+}
+
+/// A distance from the robot file and its weight, with what they do on held-out folds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct PriorTrialRecord {
+    /// How the distance is measured.
+    pub prior: PriorDistance,
+    /// Its weight, residual variances per squared deviation or per nat.
+    pub weight: f64,
+    /// Squared held-out error relative to that without constraints (mean over joints); null where nothing was held out.
+    pub loss: Option<f64>,
 }
 
 /// Errors on held-out folds of time of the training logs, rows as the fit sees them.

@@ -19,6 +19,7 @@ use crate::identification::Identification;
 use crate::log::LogSource;
 use crate::overlap::Overlaps;
 use crate::pipeline::{Beside, EXPLAINED};
+use crate::settings::PriorDistance;
 use crate::trained_log::{RowFit, TrainedLog};
 
 /// What logs say of the columns of a recipe, pooled by whoever has their factors.
@@ -32,8 +33,8 @@ pub struct Pooled {
     pub basis: Basis,
     /// Robots behind it.
     pub robots: usize,
-    /// Weight of the distance from the prior; absent: found on blocks that are held out.
-    pub prior_weight: Option<f64>,
+    /// Distance from the prior and its weight; absent: found on blocks that are held out.
+    pub prior: Option<(PriorDistance, f64)>,
     /// Per output and kernel the rows of the efforts, log 0, unweighted and without what single robots and logs have of their own.
     pub rows: Vec<ReducedGroup>,
     /// Sums over the rows of the widest kernel, output by output.
@@ -74,7 +75,8 @@ impl Recipe {
         }
         problem.training = vec![training_log(&pooled.log.name)];
         problem.settings.files.robot.clone_from(&problem.robot.path);
-        if let Some(weight) = pooled.prior_weight {
+        if let Some((distance, weight)) = pooled.prior {
+            problem.settings.estimator.prior = Some(distance);
             problem.settings.estimator.prior_weight = Some(weight);
         }
         let explained = pooled.explained();

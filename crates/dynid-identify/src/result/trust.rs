@@ -3,19 +3,25 @@
 use dynid_estimate::consistent::Status;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::EffortModel;
-use dynid_record::{ConsistencyForm, ConsistencyStatus};
+use dynid_record::{ConsistencyForm, ConsistencyStatus, PriorDistance};
 
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{
-    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
+    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PriorTrialRecord, PruningRecord, PruningStep,
+    WhitenessRecord,
 };
 use crate::identification::Identification;
-use crate::settings::Consistency;
+use crate::settings::{self, Consistency};
 
 impl Identification {
     pub(super) fn consistency_record(&self) -> Option<ConsistencyRecord> {
         let found = self.consistent.estimate.as_ref()?;
         let chance = self.fitted.inflation * self.fit().solution.kept.len() as f64;
+        let trial = &self.consistent.prior_trials[self.consistent.chosen];
+        let distance = |d: settings::PriorDistance| match d {
+            settings::PriorDistance::Quadratic => PriorDistance::Quadratic,
+            settings::PriorDistance::Entropic => PriorDistance::Entropic,
+        };
         Some(ConsistencyRecord {
             form: match self.settings.estimator.consistency {
                 Consistency::SpatialInertia => ConsistencyForm::SpatialInertia,
@@ -28,8 +34,11 @@ impl Identification {
             },
             price: found.price(),
             price_over_chance: (chance > 0.0).then(|| found.price() / chance),
-            prior_weight: self.consistent.prior_trials[self.consistent.chosen].weight,
-            prior_trials: self.consistent.prior_trials.iter().map(|t| (t.weight, t.loss)).collect(),
+            prior: distance(trial.distance),
+            prior_weight: trial.weight,
+            prior_trials: (self.consistent.prior_trials.iter())
+                .map(|t| PriorTrialRecord { prior: distance(t.distance), weight: t.weight, loss: t.loss })
+                .collect(),
             gap: found.gap,
             iterations: found.iterations,
             least_eigenvalue: found.least_eigenvalue,

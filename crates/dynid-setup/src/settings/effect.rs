@@ -2,8 +2,8 @@
 
 use super::given::{Given, refuse};
 use super::{
-    ClosedLoop, ConditioningConfig, Consistency, LogSettings, Method, PriorDistance, Route, Settings,
-    SmoothingKind, Variances,
+    ClosedLoop, ConditioningConfig, Consistency, LogSettings, Method, Route, Settings, SmoothingKind,
+    Variances,
 };
 use crate::Error;
 
@@ -50,7 +50,7 @@ impl Settings {
             refuse(
                 "`consistency = \"none\"`",
                 &[
-                    needs("prior", e.prior != PriorDistance::default(), form),
+                    needs("prior", e.prior.is_some(), form),
                     needs("prior_weight", e.prior_weight.is_some(), form),
                 ],
             )?;

@@ -73,11 +73,10 @@ pub enum Consistency {
 }
 
 /// How distance from the robot file is measured in directions that the data do not see.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorDistance {
     /// Squared distance in units of the prior standard deviations (half the mass, and the moments that go with it).
-    #[default]
     Quadratic,
     /// Entropic (Bregman log-det) divergence, the same in every frame and unit.
     Entropic,
@@ -139,8 +138,10 @@ pub struct EstimatorConfig {
     pub effort_noise: Option<f64>,
     /// Which bodies the standard parameters may describe. Default `pseudo-inertia`.
     pub consistency: Consistency,
-    /// Distance from the robot file. Default `quadratic`.
-    pub prior: PriorDistance,
+    /// Distance from the robot file. Default: where it states all bodies, that with the least error on held-out folds; `quadratic` else, where
+    /// nothing is held out, beside a `prior_weight` and with `spatial-inertia`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorDistance>,
     /// Search of shape parameters.
     pub shape: ShapeConfig,
     /// Searches over all parameters within bounds, beside the least-squares answer. Default: none.
@@ -210,7 +211,7 @@ impl Settings {
                 "nothing",
             ));
         }
-        if e.prior == PriorDistance::Entropic && e.consistency == Consistency::SpatialInertia {
+        if e.prior == Some(PriorDistance::Entropic) && e.consistency == Consistency::SpatialInertia {
             return Err(Error::setting("prior", "`quadratic` with the 6 x 6 form", "`entropic`"));
         }
         if e.consistency == Consistency::None && !self.bound.is_empty() {

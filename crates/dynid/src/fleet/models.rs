@@ -97,7 +97,7 @@ impl FleetResult {
         pooled.blocks = vec![around(&values, &covariance, rows)];
         pooled.covariance = covariance;
         let chosen = of_type.consistent.prior_trials.get(of_type.consistent.chosen);
-        pooled.prior_weight = chosen.map(|trial| SPLIT * trial.weight);
+        pooled.prior = chosen.map(|trial| (trial.distance, SPLIT * trial.weight));
         pooled.cautions.extend(reservations(robot));
         self.recipe.solve_pooled(pooled)
     }
@@ -189,7 +189,7 @@ impl FleetResult {
             covariance: Mat::zeros(0, 0),
             basis,
             robots: self.fleet.robots.len(),
-            prior_weight: None,
+            prior: None,
             rows: left.iter().enumerate().map(group).collect(),
             sums: FitSums::pooled(&sums),
             log: as_one(name, self.recipe.choices.rate_hz, &facts),
