@@ -76,8 +76,8 @@ impl Consistent {
 ///
 /// The distance from the prior decides what the data do not see. Its weight is the largest, up to that of a Gaussian prior
 /// (`κ`), that held-out folds do not speak against: with a vanishing one, unseen masses grow without limit for the sake of
-/// changes of fit far below noise. Of both ways to measure it from bodies that the robot file states, the one with the least held-out error is taken: robot files that are
-/// wrong by a factor are near in the entropic one, and those whose bodies have another form are so in the quadratic one.
+/// changes of fit far below noise. Of both ways to measure it from bodies that the robot file states, the one with the
+/// least held-out error is taken: bodies that are wrong by a factor are near in the entropic one.
 ///
 /// # Errors
 /// [`Error::Consistency`].
@@ -191,7 +191,8 @@ fn without_bodies(problem: &mut bodies::Problem) {
     }
 }
 
-/// Distances and weights to try first (`stated`: whether the robot file states all bodies), by distance, strongest first; weights to try further where the weakest of these is best.
+/// Distances and weights to try first, by distance, strongest first; weights to try further where the weakest of these is best.
+/// `stated`: whether the robot file states all bodies.
 fn trials(
     estimator: &EstimatorConfig,
     form: Form,
