@@ -10,6 +10,7 @@ use super::usual::{EXTENTS, Innovations};
 const OUTSIDE: f64 = 0.1;
 /// Alarms are first given after so many times the rows for which they are withheld otherwise.
 const FIRST: u64 = 2;
+
 /// Where the motion of a stream goes, against where it has been.
 ///
 /// A stretch that was learned from need not cover the motion to come, and no model is right everywhere: errors grow where it was never fitted, though
@@ -112,7 +113,7 @@ impl Ground {
     }
 
     /// Takes what a row asks of the estimate; whether it may raise an alarm. `inflation`: by how much information is overstated;
-    /// `is_new`: its speeds are.
+    /// `is_new`: few rows were where it is ([`Ground::visit`]).
     pub(super) fn watches(&mut self, innovation: &Innovation, inflation: f64, is_new: bool) -> Watch {
         if innovation.leverage() * inflation > OUTSIDE {
             self.left = self.settling.max(1);
