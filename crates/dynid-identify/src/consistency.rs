@@ -131,8 +131,8 @@ pub(crate) fn consistent(
             ..bodies::Settings::default()
         },
     };
-    // What was invented is near to nothing.
-    let stated = prior.bodies.iter().all(|body| body.origin == Origin::Stated);
+    // What was invented is near to nothing, and so is a payload that is to be found.
+    let stated = prior.payloads.is_empty() && prior.bodies.iter().all(|body| body.origin == Origin::Stated);
     let (strong, weak) = trials(estimator, form, stated, fitted.inflation_in_time);
     let whole =
         |trial: (PriorDistance, f64)| estimate(&problem(&fitted.estimate.factor, trial.0), &settings(trial));
@@ -192,7 +192,7 @@ fn without_bodies(problem: &mut bodies::Problem) {
 }
 
 /// Distances and weights to try first, by distance, strongest first; weights to try further where the weakest of these is best.
-/// `stated`: whether the robot file states all bodies.
+/// `stated`: whether the robot file states all bodies, and no payload is to be found.
 fn trials(
     estimator: &EstimatorConfig,
     form: Form,

@@ -139,7 +139,7 @@ pub struct EstimatorConfig {
     /// Which bodies the standard parameters may describe. Default `pseudo-inertia`.
     pub consistency: Consistency,
     /// Distance from the robot file. Default: where it states all bodies, that with the least error on held-out folds; `quadratic` else, where
-    /// nothing is held out, beside a `prior_weight` and with `spatial-inertia`.
+    /// nothing is held out, beside a `prior_weight` or a payload to be found, and with `spatial-inertia`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorDistance>,
     /// Search of shape parameters.

@@ -29,7 +29,8 @@ pub(super) fn text(id: Id) -> Text {
         Id::ClockRate => Text(
             "The time does not count seconds, or its rate is off: efforts, or measured velocities, fit only after the times are multiplied by a \
              factor.",
-            "State the unit of the time, or the rate that rows really come at.",
+            "State the unit of the time, or the rate that rows really come at. As a warning it is a doubt: numbers that no body can have explain the \
+             log as it is, so that something may act that the robot file does not hold (a gravity compensator, a load, motors that turn several joints).",
             "[columns]\ntime = { columns = \"t\", unit = \"ms\" }",
         ),
         Id::CoarseSignal => Text(
