@@ -145,6 +145,8 @@ fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
             Some("k" | "kq0") => "spring",
             Some("ca" | "cb") => "cyclic effort",
             Some("K") => "drive gain",
+            Some("bk" | "bf") => "gravity compensator",
+            Some(_) if model.tree().is_of_position(&parameter.name) => "law of the position",
             // Rotors are told one by one, other friction is projected.
             Some(_) => continue,
             None => "coupling",

@@ -12,16 +12,21 @@ use super::read_back::{CheckStates, with_slipping_bristles};
 const MOVING_SHARE: f64 = 0.02;
 
 /// Parameters beside `fc`, `fv` (or those of both directions) that need no projection: files state them, or they are no friction.
-const STATED: [&str; 16] =
-    ["fc", "fv", "fcp", "fcn", "fvp", "fvn", "Ia", "fo", "k1", "k2", "d", "K", "k", "kq0", "ca", "cb"];
-/// Parameters whose efforts follow positions: no friction, which a projection must not take for one.
-const OF_POSITION: [&str; 7] = ["k1", "k2", "d", "k", "kq0", "ca", "cb"];
+const STATED: [&str; 9] = ["fc", "fv", "fcp", "fcn", "fvp", "fvn", "Ia", "fo", "K"];
+/// Parameters of springs between motors and joints.
+const ELASTIC: [&str; 3] = ["k1", "k2", "d"];
 
 /// Linear parameters of elements that act on an output with a value other than zero, by column.
 fn acting<'a>(model: &'a RobotModel, values: &'a [f64], output: usize) -> impl Iterator<Item = usize> + 'a {
     let bodies = 10 * model.mechanism().bodies().len();
     let columns = model.layout().columns(output).iter().copied();
     columns.filter(move |c| *c >= bodies && values[*c] != 0.0)
+}
+
+/// Whether the effort of a parameter follows positions: no friction, which a projection must not take for one.
+fn follows_position(model: &RobotModel, output: usize, column: usize) -> bool {
+    is_own(model, output, column, &ELASTIC)
+        || model.tree().is_of_position(&model.parameters().linear[column].name)
 }
 
 fn is_own(model: &RobotModel, output: usize, column: usize, symbols: &[&str]) -> bool {
@@ -38,7 +43,9 @@ fn parameters(model: &RobotModel, values: &[f64], output: usize) -> Vec<(String,
 /// Whether the friction of an output has a form that files have no place for. `known`: it has known friction, too.
 fn needs_projection(model: &RobotModel, values: &[f64], known: bool, output: usize) -> bool {
     model.elastic_link(output).is_none()
-        && (known || acting(model, values, output).any(|c| !is_own(model, output, c, &STATED)))
+        && (known
+            || acting(model, values, output)
+                .any(|c| !is_own(model, output, c, &STATED) && !follows_position(model, output, c)))
 }
 
 /// The projections of all joints whose friction needs one. `known`: whether a joint has known friction.
@@ -110,9 +117,8 @@ fn is_coupled(model: &RobotModel, values: &[f64], output: usize) -> bool {
 
 /// Values of the elements of an output alone: without what follows its position, and without its rotor unless motors are `coupled`.
 fn elements_alone(model: &RobotModel, values: &[f64], output: usize, coupled: bool) -> Vec<f64> {
-    let rubs = |c: &usize| {
-        !is_own(model, output, *c, &OF_POSITION) && (coupled || !is_own(model, output, *c, &["Ia"]))
-    };
+    let rubs =
+        |c: &usize| !follows_position(model, output, *c) && (coupled || !is_own(model, output, *c, &["Ia"]));
     let mut out = vec![0.0; values.len()];
     for c in acting(model, values, output).filter(rubs) {
         out[c] = values[c];

@@ -1,4 +1,4 @@
-//! Laws of friction that files state by formulas.
+//! Laws of friction and of other efforts that files state by formulas.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,11 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A law of friction of a joint's velocity, an element like any other: `[law.NAME]`.
+/// An effort that depends on the motion of a joint, an element like any other: `[law.NAME]`.
 ///
-/// The effort is the sum of coefficients times columns. A formula is made of the velocity `v` (rad/s or m/s), the temperature `T` of the
-/// joint (°C, of the log), shape parameters, numbers, `pi`, `+ - * / ^`, `sign(v)`, `abs`, `sqrt`, `exp`, `ln`, `tanh`, `atan` and `logistic`.
+/// The effort is the sum of coefficients times columns. A formula is made of the velocity `v` (rad/s or m/s), the position `q` (rad or m), the temperature
+/// `T` of the joint (°C, of the log), shape parameters, numbers, `pi`, `+ - * / ^`, `sign(v)`, `abs`, `sqrt`, `exp`, `ln`, `sin`, `cos`, `tanh`, `atan`
+/// and `logistic`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LawSpec {
@@ -22,7 +23,7 @@ pub struct LawSpec {
     /// Shape parameters by symbol: a pair of bounds, or a table with `lower` and `upper`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shape: BTreeMap<String, LawShape>,
-    /// The effort is friction: it counts in reports on passivity, and a law for all joints takes its place. Default true.
+    /// The effort is friction: a law for all joints takes its place, and it counts in reports on passivity unless a column reads the position. Default true.
     #[serde(default = "yes")]
     pub friction: bool,
 }
@@ -72,16 +73,25 @@ pub enum LawUnit {
     Speed,
     /// s/rad, s/m.
     PerSpeed,
+    /// rad, m.
+    Position,
+    /// 1/rad, 1/m.
+    PerPosition,
+    /// N m/rad, N/m.
+    Stiffness,
     /// A number.
     Number,
 }
 
 impl LawUnit {
-    const ALL: [(LawUnit, [&'static str; 2]); 5] = [
+    const ALL: [(LawUnit, [&'static str; 2]); 8] = [
         (LawUnit::Effort, units::EFFORT),
         (LawUnit::Viscous, units::VISCOUS),
         (LawUnit::Speed, units::SPEED),
         (LawUnit::PerSpeed, units::PER_SPEED),
+        (LawUnit::Position, units::POSITION),
+        (LawUnit::PerPosition, units::PER_ANGLE),
+        (LawUnit::Stiffness, units::STIFFNESS),
         (LawUnit::Number, units::NUMBER),
     ];
 

@@ -35,8 +35,9 @@ pub const LOAD: &str = "load";
 
 /// Elements of a joint about which nothing is said.
 pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
-/// A spring between the bodies that a joint joins, and a constant effort.
+/// A spring between the bodies that a joint joins, one beside the joint, and a constant effort.
 const SPRING: &str = "spring";
+const BALANCER: &str = "balancer";
 const OFFSET: &str = "offset";
 
 /// Which elements act at which joints of a mechanism, by name.
@@ -145,7 +146,9 @@ impl ElementPlan {
                     own.chain(beside.iter().copied()).cloned().collect()
                 }
                 // A spring pulls at a joint that stands still too.
-                None => beside.into_iter().filter(|e| *e == SPRING).cloned().collect(),
+                None => {
+                    beside.into_iter().filter(|e| [SPRING, BALANCER].contains(&e.as_str())).cloned().collect()
+                }
             };
             plan.per_rate.push(elastic::without_elastic(name, &list, &spec.elastic)?);
         }
@@ -304,12 +307,20 @@ impl ElementPlan {
     /// [`Error::UnknownJoint`], [`Error::Elastic`].
     pub fn build(&self, mechanism: &Mechanism) -> Result<Vec<Box<dyn JointElement>>, Error> {
         let names = self.names(mechanism);
+        let joints = JointInfo::of(mechanism, &self.coordinates);
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for (rate, list) in self.per_rate.iter().enumerate() {
             pairs::check(self.registry(), &names[rate], list)?;
             let speed = self.limits(mechanism, rate).velocity;
             for name in list {
                 let kind = settings::kind(self.registry(), name, &names[rate])?;
+                if kind.turns && joints[rate].slides {
+                    return Err(Error::ElementSetting {
+                        element: name.clone(),
+                        joint: names[rate].clone(),
+                        fault: "it acts at joints that turn, and this one slides".to_owned(),
+                    });
+                }
                 out.extend(settings::place(kind, rate, &names[rate], speed, &self.spec.settings)?);
             }
         }

@@ -21,6 +21,9 @@ impl JointElement for Spring {
         let joint = &joints[self.rate];
         vec![joint.parameter("k", ["N m/rad", "N/m"], Some(0.0)), joint.parameter("kq0", EFFORT, None)]
     }
+    fn is_of_position(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
     }

@@ -103,6 +103,9 @@ impl JointElement for Cyclic {
     fn opposes_motion(&self) -> bool {
         self.is_friction
     }
+    fn is_of_position(&self) -> bool {
+        !self.is_friction
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
     }

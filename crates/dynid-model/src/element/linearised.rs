@@ -122,6 +122,9 @@ impl JointElement for Linearised {
     fn opposes_motion(&self) -> bool {
         self.element.opposes_motion()
     }
+    fn is_of_position(&self) -> bool {
+        self.element.is_of_position()
+    }
     fn reaction_friction(&self) -> Option<FollowingFriction<'_>> {
         let following = self.element.reaction_friction()?;
         Some(FollowingFriction { held: Some(&self.shape), ..following })

@@ -3,6 +3,7 @@
 //! Efforts count on the drive's side of the balance: `effort of the drive = rigid bodies + Σ elements`, so friction is
 //! positive for positive speed. `s(v)` is the sign with `s(0) = 0`.
 
+mod balancer;
 mod channel;
 mod clearance;
 mod compliance;
@@ -206,6 +207,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     /// factors of logs). By default: [`JointElement::is_friction`].
     fn opposes_motion(&self) -> bool {
         self.is_friction()
+    }
+    /// Whether the effort depends on the position of the joint alone: no friction, whatever the motion. False by default.
+    fn is_of_position(&self) -> bool {
+        false
     }
     /// Extra channels that it reads.
     fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {

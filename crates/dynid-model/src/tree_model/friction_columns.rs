@@ -1,4 +1,4 @@
-//! Columns of the friction of a joint along a motion.
+//! Columns of the friction of a joint along a motion, and what is none.
 
 use std::collections::BTreeMap;
 
@@ -39,5 +39,17 @@ impl TreeModel {
             }
         }
         columns.into_iter().collect()
+    }
+
+    /// Whether the linear parameter of a name is that of an element whose effort
+    /// [depends on position alone](crate::element::JointElement::is_of_position).
+    pub fn is_of_position(&self, parameter: &str) -> bool {
+        let Some(column) = self.parameters.linear.iter().position(|p| p.name == parameter) else {
+            return false;
+        };
+        self.elements
+            .iter()
+            .filter(|placed| placed.element.is_of_position())
+            .any(|placed| placed.entries.iter().any(|(_, own)| *own == column))
     }
 }

@@ -4,9 +4,9 @@
 
 use crate::random_tree::{self, check_close, generator, numbers, sample, tree};
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, DriveGain, ExternalLoad, JointElement, Linearised,
-    LoadFriction, Offset, RotorInertia, ShapeSetting, Spring, Transmission, Viscous, current_channel,
-    load_channel,
+    AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, DriveGain, ElementRegistry, ExternalLoad,
+    JointElement, Linearised, LoadFriction, Offset, Placement, RotorInertia, ShapeSetting, Spring,
+    Transmission, Viscous, current_channel, load_channel,
 };
 use dynid_model::scalar::Dual;
 use dynid_model::*;
@@ -210,7 +210,15 @@ fn model_with_elements() -> RobotModel {
     ];
     let joints = RobotModel::new(mechanism.clone(), Vec::new()).joints().to_vec();
     let free = ShapeSetting { start: 2.5, lower: 1.0, upper: 9.0, held: false };
-    // With the column of a change of `n`.
+    let spring = |phi: ShapeSetting| {
+        let shape = [ShapeSetting::held(0.7), ShapeSetting::held(0.3), phi];
+        let placement = Placement { rate: 1, shape: &shape, options: &[] };
+        ElementRegistry::default().kind("balancer").unwrap().place(&placement).unwrap().unwrap()
+    };
+    elements.push(spring(ShapeSetting::held(0.4)));
+    // With the columns of a change of their shapes.
+    let angle = ShapeSetting { start: 0.4, lower: -1.0, upper: 1.0, held: false };
+    elements.push(Box::new(Linearised::new(spring(angle), &joints, vec![0.4], vec![1.5, -0.6], vec![true])));
     for element in [Cyclic::torque(1, free), Cyclic::friction(1, free)] {
         let own = Linearised::new(Box::new(element), &joints, vec![2.5], vec![0.3, -0.8], vec![true]);
         elements.push(Box::new(own));

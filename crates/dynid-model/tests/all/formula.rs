@@ -1,7 +1,7 @@
 //! Laws of formulas: the numbers of laws in code, and what is no law.
 
 use dynid_model::element::{
-    AtJoint, ElementKind, ElementRegistry, FormulaLaw, FormulaLawFault, FormulaTerms, JetMotion,
+    AtJoint, Cyclic, ElementKind, ElementRegistry, FormulaLaw, FormulaLawFault, FormulaTerms, JetMotion,
     JointElement, JointInfo, LinearTerm, Placement as Place, ShapeSetting, ShapeTerm, laws,
     temperature_channel,
 };
@@ -29,14 +29,14 @@ fn close(a: f64, b: f64) -> bool {
 /// Columns, derivatives by shape, adjoints and jets of two elements with the same columns.
 fn compare(of_code: Box<dyn JointElement>, of_formula: Box<dyn JointElement>, shape: &[f64]) {
     let v = [-1.3, -0.2, -0.01, 0.0, 0.05, 0.7, 2.5];
-    let zeros = [0.0; 7];
+    let (q, zeros) = ([0.4, -0.3, 1.0, 0.0, -2.5, 0.9, 3.2], [0.0; 7]);
     let warm = [20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0];
     let name = temperature_channel("j1");
     let channels: [(&str, &[f64]); 1] = [(&name, &warm)];
     let jet = |element: &dyn JointElement, joints: &[JointInfo], width: f64| {
-        let (q, dq) = ([Jet::default()], [Jet::new([0.3, 1.1, -0.4])]);
+        let (q, dq, ddq) = ([Jet::new([0.7, 0.3, 1.1])], [Jet::new([0.3, 1.1, -0.4])], [Jet::default()]);
         let channels = [(name.as_str(), Jet::new([30.0, 0.1, 0.0]))];
-        let motion = JetMotion { q: &q, dq: &dq, ddq: &q, channels: &channels, sign_width: width };
+        let motion = JetMotion { q: &q, dq: &dq, ddq: &ddq, channels: &channels, sign_width: width };
         let mut out = vec![Jet::default(); element.entries().len()];
         assert!(element.jets(joints, &motion, shape, &mut out));
         out
@@ -51,11 +51,8 @@ fn compare(of_code: Box<dyn JointElement>, of_formula: Box<dyn JointElement>, sh
     let [a, b] = [of_code, of_formula].map(|element| pendulum(vec![element]));
     assert_eq!(a.shape_dependence(), b.shape_dependence());
     for width in [0.0, 0.05] {
-        let motion = MotionBlock {
-            sign_width: width,
-            channels: &channels,
-            ..MotionBlock::plain(7, &zeros, &v, &zeros)
-        };
+        let motion =
+            MotionBlock { sign_width: width, channels: &channels, ..MotionBlock::plain(7, &q, &v, &zeros) };
         let block = |model: &RobotModel| {
             let mut block = RegressorBlock::new(model.layout().clone(), 7);
             model.regressor(&motion, shape, &mut block);
@@ -74,7 +71,7 @@ fn compare(of_code: Box<dyn JointElement>, of_formula: Box<dyn JointElement>, sh
                 .collect();
             let mut out = MotionAdjoint::new(1, 1, 7);
             model.effort_adjoint(&motion, shape, &linear, 7, &[1.0; 7], &mut out);
-            out.dq
+            [out.q, out.dq].concat()
         };
         for (a, b) in [(block(&a), block(&b)), (slopes(&a), slopes(&b)), (adjoint(&a), adjoint(&b))] {
             assert_eq!(a.len(), b.len());
@@ -106,6 +103,15 @@ fn formulas_are_what_laws_in_code_are() {
     let free = ShapeSetting { start: 0.7, lower: 0.2, upper: 2.0, held: false };
     let code = AtJoint { rate: 0, law: laws::Power, shape: [free] };
     compare(Box::new(code), element(power, &[free]), &[0.7]);
+
+    let order = [ShapeTerm::positive("mn", element::units::REPETITIONS, 0.1, 100.0)];
+    let free = ShapeSetting { start: 3.5, lower: 1.0, upper: 9.0, held: false };
+    let ripple = terms(&[("ma", "cos(mn * q)"), ("mb", "sin(mn * q)")], &order);
+    compare(Box::new(Cyclic::torque(0, free)), element(ripple, &[free]), &[3.5]);
+    let rubs = terms(&[("ma", "sign(v) * cos(mn * q)"), ("mb", "sign(v) * sin(mn * q)")], &order);
+    let rubs = element(rubs, &[free]);
+    assert!(rubs.opposes_motion() && !rubs.is_friction(), "its effort is not one of the velocity alone");
+    compare(Box::new(Cyclic::friction(0, free)), rubs, &[3.5]);
 }
 
 #[test]
@@ -125,6 +131,7 @@ fn numbers_operators_and_functions_are_those_of_everywhere() {
         ("sign( v ) * abs(-3)", 3.0),
         ("v^0.5", f64::NAN),
         ("abs(v)^0.5", v.sqrt()),
+        ("cos(q) - q * sin(2*q)", 0.3_f64.cos() - 0.3 * 0.6_f64.sin()),
         ("v * (1 - 0.004*(T - 25))", v * (1.0 - 0.004 * (warm - 25.0))),
     ] {
         let law = match FormulaLaw::new(terms(&[("mk", text)], &[])) {
@@ -141,8 +148,9 @@ fn numbers_operators_and_functions_are_those_of_everywhere() {
         let placed = kind.place(&Place { rate: 0, shape: &[], options: &[] }).and_then(Result::ok);
         let model = pendulum(vec![placed.unwrap_or_else(|| panic!("a law"))]);
         let (channel, temperature, speed, zero) = (temperature_channel("j1"), [warm], [v], [0.0]);
+        let place = [0.3];
         let channels: [(&str, &[f64]); 1] = [(&channel, &temperature)];
-        let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(1, &zero, &speed, &zero) };
+        let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(1, &place, &speed, &zero) };
         let mut block = RegressorBlock::new(model.layout().clone(), 1);
         model.regressor(&motion, &[], &mut block);
         assert!((block.column(0, 10)[0] - expected).abs() < 1e-15 * (1.0 + expected.abs()), "{text}");
@@ -177,13 +185,17 @@ fn what_is_no_law_is_refused_with_the_place() {
     assert!(fault(&[("mk", &"-".repeat(900))], &[]).contains("less deep"));
     assert!(fault(&[("mk", &format!("{}1{}", "(1+".repeat(40), ")".repeat(40)))], &[]).contains("less deep"));
     assert!(fault(&[("mk", &"v*".repeat(900))], &[]).contains("at most 1000"));
-    assert!(fault(&[("mk", "sqrt(abs(v))")], &[]).contains("expected a finite slope at every speed, found"));
+    assert!(fault(&[("mk", "sqrt(abs(v))")], &[]).contains("expected a finite slope everywhere, found"));
     assert!(fault(&[("mk", "1 / (1 + exp(-v / vs))")], &[speed("vs")]).contains("a finite slope"));
     assert!(
         FormulaLaw::new(terms(&[("mk", "logistic(v / vs) - 0.5"), ("mj", "abs(v)^0.5")], &[speed("vs")]))
             .is_ok()
     );
-    assert!(fault(&[("mk", "1 / v")], &[]).contains("finite number at every speed, found"));
+    assert!(
+        fault(&[("mk", "1 / (q - 1)")], &[])
+            .contains("finite number everywhere, found inf at v = 0.0001, q = 1")
+    );
+    assert!(fault(&[("mk", "1 / v")], &[]).contains("finite number everywhere, found"));
     assert!(
         fault(&[("mk", "v * vs / vs"), ("mj", "v")], &[speed("vs"), speed("vt")])
             .contains("`vt`: no column reads it")
@@ -222,6 +234,7 @@ fn only_what_takes_energy_out_is_a_coefficient_of_friction() {
 fn random_formulas_are_laws_or_refused() {
     let parts = [
         "v",
+        "q",
         "T",
         "mw",
         "pi",
@@ -243,6 +256,8 @@ fn random_formulas_are_laws_or_refused() {
         "sqrt(",
         "exp(",
         "ln(",
+        "sin(",
+        "cos(",
         "tanh(",
         "atan(",
         "logistic(",

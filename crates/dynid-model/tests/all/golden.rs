@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, JointElement, Offset, RotorInertia,
-    ShapeSetting, Spring, Transmission, Viscous,
+    Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, Cyclic, ElementRegistry, JointElement, Offset,
+    Placement as Place, RotorInertia, ShapeSetting, Spring, Transmission, Viscous,
 };
 use dynid_model::*;
 pub(crate) use dynid_testing::golden;
@@ -384,6 +384,15 @@ fn linear_elements_follow_their_laws() {
     let element = Cyclic::torque(0, ShapeSetting::held(c["n"].as_f64().unwrap()));
     let e = effort(Box::new(element), &q, &zero, &zero, &values);
     check_close(&e, &numbers(&c["effort"]), 0.0, 1e-12, "cyclic");
+    let b = &g["balancer"];
+    let [k, radius, distance, phi, free, preload] =
+        ["k", "r", "a", "phi", "L0", "F0"].map(|key| b[key].as_f64().unwrap());
+    let registry = ElementRegistry::default();
+    let shape = [distance, radius, phi].map(ShapeSetting::held);
+    let placement = Place { rate: 0, shape: &shape, options: &[] };
+    let element = registry.kind("balancer").unwrap().place(&placement).unwrap().unwrap();
+    let e = effort(element, &numbers(&b["q"]), &zero, &zero, &[k, preload - k * free]);
+    check_close(&e, &numbers(&b["effort"]), 1e-10, 1e-12, "balancer");
 }
 
 fn six_joint_effort(

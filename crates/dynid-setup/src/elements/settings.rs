@@ -178,6 +178,16 @@ impl<'a> Settings<'a> {
         let (key, default) = (term.symbol, term.setting(v_max));
         let of = |field: &str| format!("{key}.{field}");
         let start = self.number(key)?.or(self.number(&of("start"))?);
+        if term.needed && start.is_none() {
+            let symbols: Vec<String> =
+                self.kind.shape.iter().filter(|t| t.needed).map(|t| format!("{} = ..", t.symbol)).collect();
+            return Err(self.fault(format!(
+                "`{key}`: expected a value in {}, found none; state `{} = {{ {} }}`",
+                term.units[0],
+                self.kind.name,
+                symbols.join(", ")
+            )));
+        }
         let (lower, upper) = (self.number(&of("lower"))?, self.number(&of("upper"))?);
         let held = self.flag(&of("held"))?.unwrap_or(default.held);
         // A default start outside of stated bounds moves to the nearest of them.

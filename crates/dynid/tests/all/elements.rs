@@ -45,6 +45,7 @@ fn every_name_builds_an_element_with_parameters_of_its_own() {
             "reaction_friction" => {
                 "\nreaction_friction = { loads = [{ force = [\"x\"] }], stribeck = true, viscous = true }"
             }
+            "balancer" => "\nbalancer = { ba = 0.5, br = 0.1, bphi = 0.3 }",
             _ => "",
         };
         let (mechanism, plan) = plan(&format!("elements = [\"{name}\"]{stated}"));
@@ -189,6 +190,45 @@ fn elements_beside_the_defaults() {
     );
     assert_eq!(of("beside = [\"coulomb\"]", true), names(&["viscous", "offset", "rotor", "coulomb"]));
     assert_eq!(of("beside = [\"spring\", \"stribeck\"]", false), names(&["spring"]));
+    assert_eq!(of("beside = [\"balancer\"]", false), names(&["balancer"]));
     let both = of("elements = [\"viscous\"]\nbeside = [\"spring\"]", true).unwrap_err();
     assert!(both.contains("no list of all elements of the joint beside it"), "{both}");
+}
+
+#[test]
+fn gravity_compensators_have_the_geometry_of_a_drawing() {
+    let list = "elements = [\"balancer\"]\nbalancer = ";
+    let (_, drawn) =
+        plan(&format!("{list}{{ ba = 0.5, br = 0.1, bphi = 0.3, stiffness = 9000, force = -50 }}"));
+    let mut stated = drawn.stated_values();
+    stated.sort_by(|a, b| a.0.cmp(&b.0));
+    assert_eq!(stated, [("j1.bf", -50.0), ("j1.bk", 9000.0)].map(|(name, x)| (name.to_owned(), x)));
+    let found = table(&format!(
+        "{list}{{ ba = 0.5, br = {{ start = 0.1, lower = 0.08, upper = 0.12, held = false }}, bphi = 0.3 }}"
+    ));
+    let br = &found.shape[0];
+    assert_eq!((found.shape.len(), br.name.as_str(), br.lower, br.upper), (1, "j1.br", 0.08, 0.12));
+    for (settings, parts) in [
+        (
+            "{ br = 0.1, bphi = 0.3 }",
+            &["`ba`: expected a value in m, found none", "ba = .., br = .., bphi = .."][..],
+        ),
+        ("{ ba = 0.1, br = 0.1, bphi = 0 }", &["expected `br` below `ba`", "found `br` up to 0.1"]),
+        ("{ ba = 0.1, br = 0.05, bphi = \"20deg\" }", &["`bphi`", "expected a number"]),
+        (
+            "{ ba = { start = 0.5, lower = 0.4, held = false }, br = { start = 0.1, upper = 0.2, held = false }, bphi = 0 }",
+            &["tell their ratio alone"],
+        ),
+    ] {
+        let found = fault(&format!("{list}{settings}"));
+        for part in parts {
+            assert!(found.contains(part), "{settings}: {found}");
+        }
+    }
+    let slides = "schema = 1\nname = \"one\"\ndh = \"modified\"\n[[joint]]\nname = \"j1\"\nkind = \"prismatic\"\nmass = 1.0\n\
+                  [element.j1]\nbeside = [\"balancer\"]\nbalancer = { ba = 0.5, br = 0.1, bphi = 0.3 }\n";
+    let robot = toml_robot::parse(slides, "one.toml").unwrap();
+    let mechanism = robot.description.build().unwrap();
+    let plan = ElementPlan::new(&mechanism, &robot.elements, None, |_| true).unwrap();
+    assert!(plan.build(&mechanism).unwrap_err().to_string().contains("this one slides"));
 }

@@ -206,6 +206,58 @@ fn a_law_of_formulas_goes_the_whole_way_without_a_program() {
     );
 }
 
+/// A gravity compensator, and friction and a stop that depend on the position: found, and in files of simulators no friction.
+#[test]
+fn efforts_that_follow_the_position_go_the_whole_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let arm = ARM.replace("[\"hess_soom\", \"viscous\", \"offset\"]", "LIST");
+    let laws = "[law.worn]\nshape = { wq = { lower = -1, upper = 1, unit = \"position\" } }\n\
+                [law.worn.columns]\nwf = \"sign(v) * exp(-(q - wq)^2)\"\n\
+                [law.stop]\nfriction = false\n[law.stop.columns]\nst = \"q^3\"\n";
+    let list = "[\"coulomb\", \"viscous\", \"offset\", \"balancer\", \"worn\", \"stop\"]";
+    let geometry = "balancer = { ba = 0.5, br = 0.2, bphi = 0.3 }\n";
+    let values = "coulomb = { effort = 2.0 }\nbalancer = { ba = 0.5, br = 0.2, bphi = 0.3, force = 60, stiffness = 30 }\n\
+                  worn = { wf = 3.0, wq = 0.4 }\nstop = { st = 1.5 }\n";
+    std::fs::write(path("truth.toml"), format!("{}{values}{laws}", arm.replace("LIST", list))).unwrap();
+    std::fs::write(path("arm.toml"), format!("{}{geometry}{laws}", arm.replace("LIST", list))).unwrap();
+    let robot = Robot::load(&path("truth.toml"), &RobotOptions::default()).unwrap();
+    let settings = SimulateSettings::parse("rate_hz = 250\nseed = 3\nduration_s = 20", "simulation").unwrap();
+    let log = simulate(&robot, &settings).unwrap();
+    let columns: [&[f64]; 3] = [&log.time, &log.position[0], &log.effort[0]];
+    csv::write(path("log.csv"), &["t", "q1", "tau1"], &columns).unwrap();
+    let log_config = LogConfig { path: path("log.csv"), ..LogConfig::default() };
+    let mut config = Config { robot: path("arm.toml"), log: vec![log_config], ..Config::default() };
+    config.elements.friction = Friction::Given;
+    let found = identify(&config, &mut |_| {}).unwrap().estimate();
+    for (name, truth) in [("j1.fc", 2.0), ("j1.fv", 1.2), ("j1.wf", 3.0), ("j1.st", 1.5), ("j1.bf", 60.0)] {
+        let p = found.parameters.iter().find(|p| p.name == name).unwrap();
+        let std = p.std.unwrap();
+        assert!((p.value - truth).abs() < 4.0 * std && std < 0.1 * truth, "{name}: {} ± {std}", p.value);
+    }
+    let place = &found.shape_parameters[0];
+    assert!(place.name == "j1.wq" && (place.value - 0.4).abs() < 0.05, "{}", place.value);
+
+    let file = path("estimate.json");
+    std::fs::write(&file, found.to_json()).unwrap();
+    let read = Estimate::read(&file).unwrap();
+    assert_eq!(read.to_json(), found.to_json());
+    let robot = dynid::export::IdentifiedRobot::of(&read, &file).unwrap();
+    let states = CheckStates::random(robot.identified().model);
+    let source = Source::read(&path("arm.toml")).unwrap();
+    let export = RobotExport::new(robot.identified(), &source).unwrap();
+    for exported in [export.urdf(&states).unwrap(), export.mjcf(&states).unwrap()] {
+        let notes = exported.notes.join("\n");
+        for left_out in ["gravity compensator of j1", "law of the position of j1"] {
+            assert!(notes.contains(&format!("has no place for it: {left_out}")), "{notes}");
+        }
+        // Friction that changes with position is friction still: what it is over all positions.
+        let friction = notes.split("stated as friction ").nth(1).and_then(|s| s.split(' ').next()).unwrap();
+        let friction: f64 = friction.parse().unwrap();
+        assert!((2.0..5.0).contains(&friction), "{friction}: {notes}");
+    }
+}
+
 #[test]
 fn a_registry_refuses_names_and_symbols_that_are_taken() {
     let found = registry().with(ElementKind::law("hess_soom", laws::Coulomb)).unwrap_err();

@@ -24,8 +24,12 @@ fn parameters(kind: &ElementKind) -> String {
         .shape
         .iter()
         .map(|t| {
-            let held = t.start.filter(|_| t.held).map(|x| format!(", held at {x}"));
-            format!("{} ({}{})", code(t.symbol), unit(t.units[0]), held.unwrap_or_default())
+            let held = match t.start.filter(|_| t.held) {
+                _ if t.needed => ", held, to be stated".to_owned(),
+                Some(x) => format!(", held at {x}"),
+                None => String::new(),
+            };
+            format!("{} ({}{held})", code(t.symbol), unit(t.units[0]))
         })
         .collect();
     if !shape.is_empty() {

@@ -3,7 +3,7 @@
 use dynid_algebra::scalar::{Cross, Dual, FusedTask, Jet, Scalar, run_fused};
 
 use super::FormulaAtJoint;
-use super::expression::{Formula, Inputs};
+use super::expression::{Formula, Inputs, Instant};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::{
     ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, Velocity, temperature_channel,
@@ -37,14 +37,32 @@ impl FormulaAtJoint {
         })
     }
 
-    /// Calls `to` with every sample and the value of a formula there, on numbers that `number` makes of the velocity.
+    /// By what of position and velocity a formula has derivatives: the steps of both, and where the derivatives go.
+    fn derivatives<'a>(
+        &self,
+        formula: usize,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        out: &'a mut MotionAdjoint,
+    ) -> impl Iterator<Item = ([f64; 2], &'a mut [f64])> {
+        let formula = &self.law.formulas[formula];
+        let samples = motion.samples;
+        let of = |to: &'a mut [f64], coordinate: usize| &mut to[coordinate * samples..][..samples];
+        let by_position = formula.is_positional().then_some([1.0, 0.0]);
+        let by_velocity = formula.is_of_velocity().then_some([0.0, 1.0]);
+        let position = by_position.map(|steps| (steps, of(&mut out.q, joints[self.rate].position)));
+        let velocity = by_velocity.map(|steps| (steps, of(&mut out.dq, self.rate)));
+        position.into_iter().chain(velocity)
+    }
+
+    /// Calls `to` with every sample and the value of a formula there, on numbers that `number` makes of position and velocity.
     fn samples<S: Scalar>(
         &self,
         formula: usize,
         joints: &[JointInfo],
         motion: &MotionBlock<'_>,
         shape: &[S],
-        number: impl Fn(f64) -> S,
+        number: impl Fn([f64; 2]) -> [S; 2],
         to: impl FnMut(usize, S),
     ) {
         let joint = &joints[self.rate].name;
@@ -54,7 +72,18 @@ impl FormulaAtJoint {
         });
         let formula = &self.law.formulas[formula];
         let speeds = motion.rate(self.rate);
-        run_fused(Samples { formula, speeds, logged, sign_width: motion.sign_width, shape, number, to });
+        // Reports on friction over velocities have no positions.
+        let places = formula.is_positional().then(|| motion.position(joints[self.rate].position));
+        run_fused(Samples {
+            formula,
+            speeds,
+            places,
+            logged,
+            sign_width: motion.sign_width,
+            shape,
+            number,
+            to,
+        });
     }
 }
 
@@ -64,6 +93,7 @@ const BLOCK: usize = 32;
 struct Samples<'a, S, F, T> {
     formula: &'a Formula,
     speeds: &'a [f64],
+    places: Option<&'a [f64]>,
     logged: Option<&'a [f64]>,
     sign_width: f64,
     shape: &'a [S],
@@ -71,18 +101,19 @@ struct Samples<'a, S, F, T> {
     to: T,
 }
 
-impl<S: Scalar, F: Fn(f64) -> S, T: FnMut(usize, S)> Samples<'_, S, F, T> {
+impl<S: Scalar, F: Fn([f64; 2]) -> [S; 2], T: FnMut(usize, S)> Samples<'_, S, F, T> {
     #[inline(always)]
     fn run(mut self) {
         let mut stack = Formula::stack::<S, BLOCK>();
         let zero = [S::zero(); BLOCK];
-        let mut inputs = Inputs { v: zero, sign: zero, temperature: zero };
+        let mut inputs = Inputs { q: zero, v: zero, sign: zero, temperature: zero };
         for first in (0..self.speeds.len()).step_by(BLOCK) {
             let count = BLOCK.min(self.speeds.len() - first);
             for k in 0..count {
-                let value = (self.number)(self.speeds[first + k]);
+                let [q, value] =
+                    (self.number)([self.places.map_or(0.0, |q| q[first + k]), self.speeds[first + k]]);
                 let v = Velocity { value, sign_width: self.sign_width, temperature: S::zero() };
-                (inputs.v[k], inputs.sign[k]) = (value, v.sign());
+                (inputs.q[k], inputs.v[k], inputs.sign[k]) = (q, value, v.sign());
                 if let Some(logged) = self.logged {
                     inputs.temperature[k] = S::from_f64(logged[first + k]);
                 }
@@ -95,7 +126,7 @@ impl<S: Scalar, F: Fn(f64) -> S, T: FnMut(usize, S)> Samples<'_, S, F, T> {
     }
 }
 
-impl<S: Scalar, F: Fn(f64) -> S, T: FnMut(usize, S)> FusedTask for Samples<'_, S, F, T> {
+impl<S: Scalar, F: Fn([f64; 2]) -> [S; 2], T: FnMut(usize, S)> FusedTask for Samples<'_, S, F, T> {
     #[inline(always)]
     fn fused(self) {
         self.run();
@@ -124,7 +155,14 @@ impl JointElement for FormulaAtJoint {
         self.free().map(|k| terms[k].parameter(&self.shape[k], &joints[self.rate])).collect()
     }
     fn is_friction(&self) -> bool {
+        self.law.is_friction()
+    }
+    fn opposes_motion(&self) -> bool {
         self.law.terms.is_friction
+    }
+    fn is_of_position(&self) -> bool {
+        let formulas = &self.law.formulas;
+        self.law.is_positional() && !formulas.iter().any(|f| f.is_of_velocity() || f.is_thermal())
     }
     fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
         let thermal = self.law.is_thermal();
@@ -143,7 +181,7 @@ impl JointElement for FormulaAtJoint {
         let shape = self.values(shape);
         for entry in 0..self.law.formulas.len() {
             let to = out.column(entry);
-            self.samples(entry, joints, motion, &shape, |v| v, |s, value| to[s] = value);
+            self.samples(entry, joints, motion, &shape, |state| state, |s, value| to[s] = value);
         }
     }
     fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
@@ -153,9 +191,10 @@ impl JointElement for FormulaAtJoint {
         };
         let Some(temperature) = temperature else { return false };
         let v = Velocity { value: motion.dq[self.rate], sign_width: motion.sign_width, temperature };
+        let q = motion.q[joints[self.rate].position];
         let shape: Vec<Jet> = self.values(shape).into_iter().map(Jet::from_f64).collect();
         for (to, formula) in out.iter_mut().zip(&self.law.formulas) {
-            *to = formula.at(v, &shape);
+            *to = formula.at(Instant { q, v }, &shape);
         }
         true
     }
@@ -174,7 +213,8 @@ impl JointElement for FormulaAtJoint {
             let by: Vec<Dual<1>> =
                 values.iter().enumerate().map(|(p, x)| dual(*x, f64::from(u8::from(p == k)))).collect();
             let to = out.column(pair);
-            self.samples(entry, joints, motion, &by, |v| dual(v, 0.0), |s, x| to[s] = x.derivative[0]);
+            let number = |state: [f64; 2]| state.map(|x| dual(x, 0.0));
+            self.samples(entry, joints, motion, &by, number, |s, x| to[s] = x.derivative[0]);
         }
     }
     fn shape_adjoint(
@@ -186,14 +226,16 @@ impl JointElement for FormulaAtJoint {
         out: &mut MotionAdjoint,
     ) {
         let values = self.values(shape);
-        let to = &mut out.dq[self.rate * motion.samples..][..motion.samples];
         for (pair, (entry, k, _)) in self.pairs().enumerate() {
             let of =
                 |(p, x): (usize, &f64)| Cross { value: *x, a: 0.0, b: f64::from(u8::from(p == k)), ab: 0.0 };
             let by: Vec<Cross> = values.iter().enumerate().map(of).collect();
             let weights = weights.column(pair);
-            let number = |v| Cross { value: v, a: 1.0, b: 0.0, ab: 0.0 };
-            self.samples(entry, joints, motion, &by, number, |s, x| to[s] += weights[s] * x.ab);
+            for (steps, to) in self.derivatives(entry, joints, motion, out) {
+                let number =
+                    |state: [f64; 2]| [0, 1].map(|s| Cross { value: state[s], a: steps[s], b: 0.0, ab: 0.0 });
+                self.samples(entry, joints, motion, &by, number, |s, x| to[s] += weights[s] * x.ab);
+            }
         }
     }
     fn adjoint(
@@ -205,11 +247,13 @@ impl JointElement for FormulaAtJoint {
         out: &mut MotionAdjoint,
     ) {
         let shape: Vec<Dual<1>> = self.values(shape).into_iter().map(|x| dual(x, 0.0)).collect();
-        let to = &mut out.dq[self.rate * motion.samples..][..motion.samples];
         for entry in 0..self.law.formulas.len() {
             let weights = weights.column(entry);
-            let add = |s: usize, x: Dual<1>| to[s] += weights[s] * x.derivative[0];
-            self.samples(entry, joints, motion, &shape, |v| dual(v, 1.0), add);
+            for (steps, to) in self.derivatives(entry, joints, motion, out) {
+                let number = |state: [f64; 2]| [0, 1].map(|s| dual(state[s], steps[s]));
+                let add = |s: usize, x: Dual<1>| to[s] += weights[s] * x.derivative[0];
+                self.samples(entry, joints, motion, &shape, number, add);
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Formulas of one velocity: text to a program, run on any [`Scalar`].
+//! Formulas of the motion of one joint: text to a program, run on any [`Scalar`].
 
 use dynid_algebra::scalar::Scalar;
 
@@ -12,8 +12,10 @@ const DEEPEST: usize = 16;
 const PRODUCT: f64 = 16.0;
 
 /// Names that a formula gives a meaning to, which no parameter can have.
-pub const RESERVED: [&str; 11] =
-    ["v", "T", "pi", "sign", "abs", "sqrt", "exp", "ln", "tanh", "atan", "logistic"];
+pub const RESERVED: [&str; 14] =
+    ["v", "q", "T", "pi", "sign", "abs", "sqrt", "exp", "ln", "sin", "cos", "tanh", "atan", "logistic"];
+/// How many of them are no functions.
+const VALUES: usize = 4;
 
 /// Why a formula cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,6 +36,8 @@ enum Step {
     Number(f64),
     /// `v`.
     Velocity,
+    /// `q`.
+    Position,
     /// `sign(v)`.
     Sign,
     /// `T`.
@@ -56,12 +60,53 @@ enum Function {
     Sqrt,
     Exp,
     Ln,
+    Sin,
+    Cos,
     Tanh,
     Atan,
     Logistic,
 }
 
-/// A formula in the velocity `v`, the temperature `T` and shape parameters.
+impl Function {
+    fn named(name: &str) -> Option<Function> {
+        Some(match name {
+            "abs" => Function::Abs,
+            "sqrt" => Function::Sqrt,
+            "exp" => Function::Exp,
+            "ln" => Function::Ln,
+            "sin" => Function::Sin,
+            "cos" => Function::Cos,
+            "tanh" => Function::Tanh,
+            "atan" => Function::Atan,
+            "logistic" => Function::Logistic,
+            _ => return None,
+        })
+    }
+
+    #[inline(always)]
+    fn of<S: Scalar>(self, values: &mut [S]) {
+        match self {
+            Function::Abs => each(values, S::magnitude),
+            Function::Sqrt => each(values, S::root),
+            Function::Exp => each(values, S::exponential),
+            Function::Ln => each(values, S::logarithm),
+            Function::Sin => each(values, |x| x.sin_cos().0),
+            Function::Cos => each(values, |x| x.sin_cos().1),
+            Function::Tanh => each(values, S::hyperbolic_tangent),
+            Function::Atan => each(values, S::arctangent),
+            Function::Logistic => each(values, S::logistic),
+        }
+    }
+}
+
+/// What a formula reads at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instant<S> {
+    pub(super) q: S,
+    pub(super) v: Velocity<S>,
+}
+
+/// A formula in the velocity `v`, the position `q`, the temperature `T` and shape parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Formula {
     steps: Vec<Step>,
@@ -87,23 +132,33 @@ impl Formula {
         self.steps.contains(&Step::Temperature)
     }
 
+    /// Whether it reads the position.
+    pub(super) fn is_positional(&self) -> bool {
+        self.steps.contains(&Step::Position)
+    }
+
+    /// Whether it reads the velocity or its sign.
+    pub(super) fn is_of_velocity(&self) -> bool {
+        self.steps.contains(&Step::Velocity) || self.steps.contains(&Step::Sign)
+    }
+
     /// Whether it reads a shape parameter.
     pub(super) fn reads(&self, parameter: usize) -> bool {
         self.steps.contains(&Step::Shape(parameter))
     }
 
     /// Its value.
-    pub(super) fn at<S: Scalar>(&self, v: Velocity<S>, shape: &[S]) -> S {
-        self.alone(v, shape, S::power)
+    pub(super) fn at<S: Scalar>(&self, instant: Instant<S>, shape: &[S]) -> S {
+        self.alone(instant, shape, S::power)
     }
 
     /// Its value, not a number where a number below 0 is raised to a power that is not whole: [`Scalar::power`] takes none.
-    pub(super) fn tried(&self, v: Velocity<f64>, shape: &[f64]) -> f64 {
-        self.alone(v, shape, |x, p| if x < 0.0 { f64::NAN } else { x.power(p) })
+    pub(super) fn tried(&self, instant: Instant<f64>, shape: &[f64]) -> f64 {
+        self.alone(instant, shape, |x, p| if x < 0.0 { f64::NAN } else { x.power(p) })
     }
 
-    fn alone<S: Scalar>(&self, v: Velocity<S>, shape: &[S], power: impl Fn(S, S) -> S) -> S {
-        let inputs = Inputs { v: [v.value()], sign: [v.sign()], temperature: [v.temperature()] };
+    fn alone<S: Scalar>(&self, Instant { q, v }: Instant<S>, shape: &[S], power: impl Fn(S, S) -> S) -> S {
+        let inputs = Inputs { q: [q], v: [v.value()], sign: [v.sign()], temperature: [v.temperature()] };
         let mut stack = [[S::zero()]; DEEPEST];
         self.run(&inputs, shape, &mut stack, power);
         stack[0][0]
@@ -128,18 +183,13 @@ impl Formula {
             match *step {
                 Step::Number(x) => push(stack, &mut top, &[S::from_f64(x); N]),
                 Step::Velocity => push(stack, &mut top, &at.v),
+                Step::Position => push(stack, &mut top, &at.q),
                 Step::Sign => push(stack, &mut top, &at.sign),
                 Step::Temperature => push(stack, &mut top, &at.temperature),
                 Step::Shape(k) => push(stack, &mut top, &[shape[k]; N]),
                 Step::Negate => each(&mut stack[top - 1], |x| -x),
                 Step::Whole(exponent) => each(&mut stack[top - 1], |x| whole(x, exponent)),
-                Step::Call(Function::Abs) => each(&mut stack[top - 1], S::magnitude),
-                Step::Call(Function::Sqrt) => each(&mut stack[top - 1], S::root),
-                Step::Call(Function::Exp) => each(&mut stack[top - 1], S::exponential),
-                Step::Call(Function::Ln) => each(&mut stack[top - 1], S::logarithm),
-                Step::Call(Function::Tanh) => each(&mut stack[top - 1], S::hyperbolic_tangent),
-                Step::Call(Function::Atan) => each(&mut stack[top - 1], S::arctangent),
-                Step::Call(Function::Logistic) => each(&mut stack[top - 1], S::logistic),
+                Step::Call(function) => function.of(&mut stack[top - 1]),
                 Step::Add => pair(stack, &mut top, |a, b| a + b),
                 Step::Subtract => pair(stack, &mut top, |a, b| a - b),
                 Step::Multiply => pair(stack, &mut top, |a, b| a * b),
@@ -152,6 +202,7 @@ impl Formula {
 
 /// What a formula reads at `N` samples.
 pub(super) struct Inputs<S, const N: usize> {
+    pub(super) q: [S; N],
     pub(super) v: [S; N],
     pub(super) sign: [S; N],
     pub(super) temperature: [S; N],
@@ -164,7 +215,7 @@ fn push<S: Scalar, const N: usize>(stack: &mut [[S; N]], top: &mut usize, values
 }
 
 #[inline(always)]
-fn each<S: Scalar, const N: usize>(values: &mut [S; N], f: impl Fn(S) -> S) {
+fn each<S: Scalar>(values: &mut [S], f: impl Fn(S) -> S) {
     for x in values {
         *x = f(*x);
     }
@@ -320,6 +371,7 @@ impl<'a> Reader<'a> {
         }
         match &rest[..word] {
             "v" => self.named(word, Step::Velocity),
+            "q" => self.named(word, Step::Position),
             "T" => self.named(word, Step::Temperature),
             "pi" => self.named(word, Step::Number(std::f64::consts::PI)),
             "sign" => {
@@ -334,16 +386,7 @@ impl<'a> Reader<'a> {
                 if let Some(k) = self.shape.iter().position(|symbol| symbol == &name) {
                     return self.named(word, Step::Shape(k));
                 }
-                let function = match name {
-                    "abs" => Function::Abs,
-                    "sqrt" => Function::Sqrt,
-                    "exp" => Function::Exp,
-                    "ln" => Function::Ln,
-                    "tanh" => Function::Tanh,
-                    "atan" => Function::Atan,
-                    "logistic" => Function::Logistic,
-                    _ => return Err(self.unknown()),
-                };
+                let Some(function) = Function::named(name) else { return Err(self.unknown()) };
                 self.at += word;
                 if !self.take("(") {
                     return Err(self.fault("`(`"));
@@ -357,12 +400,12 @@ impl<'a> Reader<'a> {
     }
 
     fn unknown(&self) -> FormulaFault {
-        let functions = RESERVED[3..].join(", ");
+        let functions = RESERVED[VALUES..].join(", ");
         let parameters = match self.shape {
             [] => "no shape parameter (there is none under `shape`)".to_owned(),
             names => format!("a shape parameter ({})", names.join(", ")),
         };
-        self.fault(&format!("a number, v, T, pi, {parameters} or a function ({functions})"))
+        self.fault(&format!("a number, v, q, T, pi, {parameters} or a function ({functions})"))
     }
 
     fn close(&mut self) -> Result<(), FormulaFault> {

@@ -1,4 +1,4 @@
-//! Laws of velocity that are stated by formulas, not by code: a file may bring its own.
+//! Laws of the motion of a joint that are stated by formulas, not by code: a file may bring its own.
 
 mod at_joint;
 mod expression;
@@ -11,12 +11,13 @@ pub use expression::{FormulaFault, RESERVED};
 use dynid_algebra::scalar::{Cross, Scalar};
 
 use super::{LinearTerm, ShapeTerm, Velocity};
-use expression::Formula;
+use expression::{Formula, Instant};
 
 /// Most coefficients, and most shape parameters, of a law.
 const MOST: usize = 8;
-/// Speeds at which columns are tried, rad/s or m/s, and temperatures, °C.
+/// Speeds at which columns are tried, rad/s or m/s, positions, rad or m, and temperatures, °C.
 const TRIED: [f64; 7] = [1e-4, 1e-2, 0.1, 0.5, 1.0, 3.0, 10.0];
+const PLACES: [f64; 7] = [0.0, 0.1, -0.4, 1.0, -1.5, 2.2, -3.0];
 const WARM: [f64; 3] = [0.0, 25.0, 60.0];
 
 /// What a law is made of.
@@ -26,7 +27,7 @@ pub struct FormulaTerms {
     pub columns: Vec<(LinearTerm, String)>,
     /// Shape parameters.
     pub shape: Vec<ShapeTerm>,
-    /// The effort is friction of the joint's own velocity.
+    /// The effort is friction. Of the joint's own velocity alone, unless a column reads the position.
     pub is_friction: bool,
 }
 
@@ -77,7 +78,7 @@ pub enum FormulaLawFault {
         symbol: &'static str,
     },
     /// A column that is no number somewhere, or has no slope.
-    #[error("column `{symbol}`: expected a finite {what} at every speed, found {found} at v = {v}{}", at.iter().map(|(s, x)| format!(", {s} = {x}")).collect::<String>())]
+    #[error("column `{symbol}`: expected a finite {what} everywhere, found {found} at v = {v}, q = {q}{}", at.iter().map(|(s, x)| format!(", {s} = {x}")).collect::<String>())]
     NotFinite {
         /// The coefficient.
         symbol: &'static str,
@@ -87,15 +88,17 @@ pub enum FormulaLawFault {
         found: f64,
         /// The velocity.
         v: f64,
+        /// The position.
+        q: f64,
         /// Values of the shape parameters.
         at: Vec<(&'static str, f64)>,
     },
 }
 
-/// A law of velocity whose columns are formulas; see [`ElementKind::formula`](super::ElementKind::formula).
+/// A law whose columns are formulas of the motion of a joint; see [`ElementKind::formula`](super::ElementKind::formula).
 ///
-/// A formula is made of the velocity `v` (rad/s or m/s), the temperature `T` of the joint (°C, from the log), shape parameters, numbers, `pi`, `+ - * / ^`,
-/// `sign(v)`, `abs`, `sqrt`, `exp`, `ln`, `tanh`, `atan` and `logistic` (`1 / (1 + exp(-x))`). Values, slopes and time derivatives follow from it exactly. `x^p`
+/// A formula is made of the velocity `v` (rad/s or m/s), the position `q` (rad or m), the temperature `T` of the joint (°C, from the log), shape parameters,
+/// numbers, `pi`, `+ - * / ^`, `sign(v)`, `abs`, `sqrt`, `exp`, `ln`, `sin`, `cos`, `tanh`, `atan` and `logistic` (`1 / (1 + exp(-x))`). Values, slopes and time derivatives follow from it exactly. `x^p`
 /// with a `p` that is no whole number from -16 to 16 asks for an `x` that is not negative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FormulaLaw {
@@ -104,7 +107,7 @@ pub struct FormulaLaw {
 }
 
 impl FormulaLaw {
-    /// A law of its terms. Columns are tried over speeds, temperatures and bounds.
+    /// A law of its terms. Columns are tried over speeds, positions, temperatures and bounds.
     ///
     /// # Errors
     /// [`FormulaLawFault`].
@@ -147,9 +150,11 @@ impl FormulaLaw {
         }
         law.tried()?;
         // A coefficient of friction takes energy out of the motion where it is positive: `-v^3` has none.
-        for ((term, _), formula) in law.terms.columns.iter_mut().zip(&law.formulas) {
-            term.coefficient &=
-                points(&law.terms.shape).all(|(v, at, shape)| v * formula.tried(at, &shape) >= 0.0);
+        let takes =
+            |formula: &Formula| law.points().all(|(at, shape)| at.v.value * formula.tried(at, &shape) >= 0.0);
+        let takes: Vec<bool> = law.formulas.iter().map(takes).collect();
+        for ((term, _), takes) in law.terms.columns.iter_mut().zip(takes) {
+            term.coefficient &= takes;
         }
         Ok(law)
     }
@@ -165,18 +170,28 @@ impl FormulaLaw {
         self.terms.columns.iter().map(part).collect::<Vec<_>>().join(" + ")
     }
 
+    /// Whether the effort is friction of the joint's own velocity alone.
+    pub fn is_friction(&self) -> bool {
+        self.terms.is_friction && !self.is_positional()
+    }
+
+    fn is_positional(&self) -> bool {
+        self.formulas.iter().any(Formula::is_positional)
+    }
+
     fn is_thermal(&self) -> bool {
         self.formulas.iter().any(Formula::is_thermal)
     }
 
     fn tried(&self) -> Result<(), FormulaLawFault> {
-        for (v, at, shape) in points(&self.terms.shape) {
+        for (instant, shape) in self.points() {
+            let Instant { q, v } = instant;
             for (formula, (term, _)) in self.formulas.iter().zip(&self.terms.columns) {
                 let fault = |what, found| {
                     let at = self.terms.shape.iter().map(|t| t.symbol).zip(shape.iter().copied()).collect();
-                    FormulaLawFault::NotFinite { symbol: term.symbol, what, found, v, at }
+                    FormulaLawFault::NotFinite { symbol: term.symbol, what, found, v: v.value, q, at }
                 };
-                let found = formula.tried(at, &shape);
+                let found = formula.tried(instant, &shape);
                 if !found.is_finite() {
                     return Err(fault("number", found));
                 }
@@ -184,33 +199,39 @@ impl FormulaLaw {
                 for by in 0..shape.len().max(1) {
                     let of = |(k, x): (usize, &f64)| cross(*x, 0.0, f64::from(u8::from(k == by)));
                     let shape: Vec<Cross> = shape.iter().enumerate().map(of).collect();
-                    let at = Velocity {
-                        value: cross(v, 1.0, 0.0),
-                        sign_width: 0.0,
-                        temperature: Cross::from_f64(at.temperature),
-                    };
-                    let Cross { a, b, ab, .. } = formula.at(at, &shape);
-                    if let Some(slope) = [a, b, ab].into_iter().find(|slope| !slope.is_finite()) {
-                        return Err(fault("slope", slope));
+                    for [by_q, by_v] in [[0.0, 1.0], [1.0, 0.0]] {
+                        let temperature = Cross::from_f64(v.temperature);
+                        let value = cross(v.value, by_v, 0.0);
+                        let v = Velocity { value, sign_width: 0.0, temperature };
+                        let Cross { a, b, ab, .. } =
+                            formula.at(Instant { q: cross(q, by_q, 0.0), v }, &shape);
+                        if let Some(slope) = [a, b, ab].into_iter().find(|slope| !slope.is_finite()) {
+                            return Err(fault("slope", slope));
+                        }
                     }
                 }
             }
         }
         Ok(())
     }
-}
 
-/// Where columns are tried: velocities of both signs and none, at temperatures, with all shape parameters at their start, lower and upper bounds.
-fn points(shape: &[ShapeTerm]) -> impl Iterator<Item = (f64, Velocity<f64>, Vec<f64>)> {
-    let settings: Vec<_> = shape.iter().map(|term| term.setting(1.0)).collect();
-    let ends: [fn(&super::ShapeSetting) -> f64; 3] = [|s| s.start, |s| s.lower, |s| s.upper];
-    let velocities = || TRIED.into_iter().flat_map(|v| [v, -v]).chain([0.0]);
-    ends.into_iter().flat_map(move |end| {
-        let shape: Vec<f64> = settings.iter().map(end).collect();
-        velocities().flat_map(|v| WARM.map(|temperature| (v, temperature))).map(move |(v, temperature)| {
-            (v, Velocity { value: v, sign_width: 0.0, temperature }, shape.clone())
+    /// Where columns are tried: velocities of both signs and none, at temperatures and positions, with all shape parameters at their start, lower and
+    /// upper bounds.
+    fn points(&self) -> impl Iterator<Item = (Instant<f64>, Vec<f64>)> + use<> {
+        let settings: Vec<_> = self.terms.shape.iter().map(|term| term.setting(1.0)).collect();
+        let places = if self.is_positional() { &PLACES[..] } else { &PLACES[..1] };
+        let ends: [fn(&super::ShapeSetting) -> f64; 3] = [|s| s.start, |s| s.lower, |s| s.upper];
+        let velocities = || TRIED.into_iter().flat_map(|v| [v, -v]).chain([0.0]);
+        let states = move || velocities().flat_map(move |v| places.iter().map(move |q| (*q, v)));
+        ends.into_iter().flat_map(move |end| {
+            let shape: Vec<f64> = settings.iter().map(end).collect();
+            states().flat_map(|state| WARM.map(|temperature| (state, temperature))).map(
+                move |((q, v), temperature)| {
+                    (Instant { q, v: Velocity { value: v, sign_width: 0.0, temperature } }, shape.clone())
+                },
+            )
         })
-    })
+    }
 }
 
 fn cross(value: f64, a: f64, b: f64) -> Cross {

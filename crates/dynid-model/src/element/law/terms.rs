@@ -11,6 +11,10 @@ pub mod units {
     pub const VISCOUS: [&str; 2] = ["N m s/rad", "N s/m"];
     /// Of a speed.
     pub const SPEED: [&str; 2] = ["rad/s", "m/s"];
+    /// Of a position.
+    pub const POSITION: [&str; 2] = ["rad", "m"];
+    /// Of a stiffness.
+    pub const STIFFNESS: [&str; 2] = ["N m/rad", "N/m"];
     /// Of what multiplies a position.
     pub const PER_ANGLE: [&str; 2] = ["1/rad", "1/m"];
     /// Of what multiplies a speed.
@@ -103,13 +107,25 @@ pub struct ShapeTerm {
     pub scale: ShapeScale,
     /// Values must be above 0 and are searched on a logarithmic scale.
     pub positive: bool,
+    /// No value is likely: whoever names the element states one.
+    pub needed: bool,
 }
 
 impl ShapeTerm {
     /// A positive number between bounds, searched from their geometric mean.
     pub const fn positive(symbol: &'static str, units: [&'static str; 2], lower: f64, upper: f64) -> Self {
         let scale = ShapeScale::Fixed;
-        ShapeTerm { symbol, units, lower, upper, start: None, held: false, scale, positive: true }
+        ShapeTerm {
+            symbol,
+            units,
+            lower,
+            upper,
+            start: None,
+            held: false,
+            scale,
+            positive: true,
+            needed: false,
+        }
     }
 
     /// A speed between bounds in units of the largest speed in use, searched from their geometric mean.
@@ -140,6 +156,12 @@ impl ShapeTerm {
     #[must_use]
     pub const fn held_at(self, value: f64) -> Self {
         ShapeTerm { start: Some(value), held: true, ..self }
+    }
+
+    /// Returns the term, known at a value that has to be stated unless a setting frees it.
+    #[must_use]
+    pub const fn needed(self) -> Self {
+        ShapeTerm { needed: true, held: true, ..self }
     }
 
     /// Whether the bounds go with the speeds in use.

@@ -29,6 +29,8 @@ pub struct ElementKind {
     pub friction: bool,
     /// One law of friction for all joints takes its place.
     pub gives_way: bool,
+    /// Only joints that turn have it.
+    pub turns: bool,
     /// Elements that say the same whatever the motion: name, and why. Those are to be left out beside it.
     pub excludes: Vec<(&'static str, &'static str)>,
     /// Elements that only a suitable motion tells from it: name, and what it takes.
@@ -187,25 +189,16 @@ impl ElementKind {
         ElementKind { linear, shape, stated, friction, gives_way: friction, ..Self::bare(name, build) }
     }
 
-    /// A law of velocity that is stated by formulas. As [`ElementKind::law`].
+    /// A law that is stated by formulas. As [`ElementKind::law`].
     pub fn formula(name: &str, law: FormulaLaw) -> Self {
         let terms = law.terms();
         let linear: Vec<LinearTerm> = terms.columns.iter().map(|(term, _)| *term).collect();
         let stated = linear.iter().map(|term| StatedTerm { key: term.symbol, symbol: term.symbol }).collect();
-        let (shape, friction) = (terms.shape.clone(), terms.is_friction);
+        let (shape, friction, gives_way) = (terms.shape.clone(), law.is_friction(), terms.is_friction);
         let equation = kept(&law.equation());
         let law = Arc::new(law);
         let bare = Self::bare(kept(name), Build::Law(law.clone()));
-        ElementKind {
-            linear,
-            shape,
-            stated,
-            friction,
-            gives_way: friction,
-            equation,
-            formula: Some(law),
-            ..bare
-        }
+        ElementKind { linear, shape, stated, friction, gives_way, equation, formula: Some(law), ..bare }
     }
 
     pub(super) fn bare(name: &'static str, build: Build) -> Self {
@@ -220,6 +213,7 @@ impl ElementKind {
             options: Vec::new(),
             friction: false,
             gives_way: false,
+            turns: false,
             excludes: Vec::new(),
             alike: Vec::new(),
             candidate: None,

@@ -1,10 +1,10 @@
 //! The kinds of elements that come with the crate.
 
 use super::kind::{Build, Candidate, ElementKind, OptionTerm, Placement};
-use crate::element::law::units::{NUMBER, PER_SPEED, VISCOUS};
+use crate::element::law::units::{NUMBER, PER_SPEED, STIFFNESS, VISCOUS};
 use crate::element::{
     AtJoint, Cyclic, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, ReactionFriction,
-    RotorInertia, Spring, Stribeck, VelocityLaw, laws,
+    RotorInertia, Spring, Stribeck, VelocityLaw, balancer, laws,
 };
 
 /// What tells elements apart that differ next to rest alone.
@@ -76,12 +76,13 @@ fn others() -> Vec<ElementKind> {
         .keys(&["inertia"]),
         of(
             "spring",
-            &[LinearTerm::new("k", ["N m/rad", "N/m"]).at_least(0.0), LinearTerm::effort("kq0")],
+            &[LinearTerm::new("k", STIFFNESS).at_least(0.0), LinearTerm::effort("kq0")],
             |p| Ok(Box::new(Spring { rate: p.rate })),
         )
         .equation("k (q - q0)")
         .help("`kq0 = k q0`")
         .keys(&["stiffness", "kq0"]),
+        balancer(),
         ElementKind { shape: vec![Cyclic::TORQUE_CYCLES], ..cyclic }
             .equation("ca cos(n q) + cb sin(n q)")
             .help("torque ripple: `n` repetitions per turn, set by `cyclic = { cycles = n }`"),
@@ -94,6 +95,15 @@ fn others() -> Vec<ElementKind> {
         .equation("-K i")
         .help("see [currents](../questions/currents.md#the-gains-are-unknown)"),
     ]
+}
+
+fn balancer() -> ElementKind {
+    let kind = of("balancer", &balancer::LINEAR, balancer::place);
+    ElementKind { shape: balancer::SHAPE.to_vec(), turns: true, ..kind }
+        .equation("(bf + bk L) ba br sin(q + bphi)/L, L² = ba² + br² - 2 ba br cos(q + bphi)")
+        .help("a coil or gas spring that carries a link: [Gravity compensators](#gravity-compensators)")
+        .keys(&["stiffness", "force"])
+        .alike("spring", "positions over most of a turn")
 }
 
 /// Friction of velocity with shape parameters that takes the place of Coulomb or viscous friction, or joins them.
@@ -294,7 +304,7 @@ fn reaction_friction() -> ElementKind {
 fn elastic() -> ElementKind {
     ElementKind {
         linear: vec![
-            LinearTerm::new("k1", ["N m/rad", "N/m"]).at_least(0.0),
+            LinearTerm::new("k1", STIFFNESS).at_least(0.0),
             LinearTerm::new("k2", ["N m/rad³", "N/m³"]),
             LinearTerm::new("d", VISCOUS).at_least(0.0),
         ],
