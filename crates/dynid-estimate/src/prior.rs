@@ -65,6 +65,15 @@ pub struct Prior {
     pub warnings: Vec<String>,
 }
 
+impl Prior {
+    /// Whether the robot file states bodies of its own: not none, and not the same numbers for all, which files of kinematics have in place of some.
+    pub fn states_bodies(&self) -> bool {
+        let first = self.bodies.first().map(|b| b.inertia);
+        let alike = self.bodies.len() > 1 && self.bodies.iter().all(|b| Some(b.inertia) == first);
+        !alike && self.bodies.iter().all(|b| b.origin != Origin::Invented)
+    }
+}
+
 /// Prior of a model.
 ///
 /// - `stated`: per linear parameter the value that the robot file (or the configuration) states.

@@ -132,7 +132,9 @@ pub(crate) fn consistent(
         },
     };
     // What was invented is near to nothing, and so is a payload that is to be found.
-    let stated = prior.payloads.is_empty() && prior.bodies.iter().all(|body| body.origin == Origin::Stated);
+    let stated = prior.payloads.is_empty()
+        && prior.states_bodies()
+        && prior.bodies.iter().all(|body| body.origin == Origin::Stated);
     let (strong, weak) = trials(estimator, form, stated, fitted.inflation_in_time);
     let whole =
         |trial: (PriorDistance, f64)| estimate(&problem(&fitted.estimate.factor, trial.0), &settings(trial));

@@ -11,7 +11,7 @@ use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, predict};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::prior::{Origin, Prior};
+use crate::prior::Prior;
 use crate::settings::MASSES;
 
 /// Gravity counts from this share of what stated bodies weigh at their size on (root mean square over the joints).
@@ -112,13 +112,6 @@ impl EffortScale {
     }
 }
 
-/// Whether a robot file states bodies of its own: not none, and not the same for all.
-pub(crate) fn states_bodies(prior: &Prior) -> bool {
-    let first = prior.bodies.first().map(|b| b.inertia);
-    let alike = prior.bodies.len() > 1 && prior.bodies.iter().all(|b| Some(b.inertia) == first);
-    !alike && prior.bodies.iter().all(|b| b.origin != Origin::Invented)
-}
-
 /// Checks known masses: names of payloads or links of the model, positive numbers. Gives the column of each.
 ///
 /// # Errors
@@ -169,7 +162,7 @@ pub(crate) fn by_robot_file(
     state_hz: f64,
     settings: &ConditioningSettings,
 ) -> Result<Option<f64>, Error> {
-    if !states_bodies(prior) {
+    if !prior.states_bodies() {
         return Ok(None);
     }
     let bodies = 10 * prior.bodies.len();
@@ -202,7 +195,7 @@ pub(crate) fn by_robot_file_in_rows(
     prior: &Prior,
     groups: &[ReducedGroup],
 ) -> Option<f64> {
-    if !states_bodies(prior) {
+    if !prior.states_bodies() {
         return None;
     }
     let bodies = 10 * prior.bodies.len();

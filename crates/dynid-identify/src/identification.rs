@@ -22,7 +22,7 @@ use crate::estimate::LogFit;
 use crate::finding::Finding;
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
-use crate::joint_cyclic::JointCyclic;
+use crate::joint_cyclic::{JointCyclic, JointSlow};
 use crate::joint_stiffness::JointStiffness;
 use crate::journal_doubt::JournalSeen;
 use crate::load_rounds::LoadRounds;
@@ -81,6 +81,8 @@ pub struct Identification {
     pub friction: Vec<JointFriction>,
     /// Cyclic efforts that the residuals of a first fit showed, beside the elements asked for.
     pub cyclic: Vec<JointCyclic>,
+    /// What the residuals of joints hold of slow functions of their positions; empty on the textbook route and for joints that do not pass often enough.
+    pub slow: Vec<JointSlow>,
     /// What is known about the parameters without logs.
     pub prior: Prior,
     /// The fit in the base columns.

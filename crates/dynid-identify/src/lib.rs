@@ -58,5 +58,5 @@ pub use dynid_setup::{
 use dynid_setup::{check, finding, input_record, reduction_error, training_log};
 pub use estimate::Estimate;
 pub use identification::Identification;
-pub use joint_cyclic::JointCyclic;
+pub use joint_cyclic::{JointCyclic, JointSlow};
 pub use pipeline::{Step, identify};

@@ -61,6 +61,7 @@ pub fn judge(id: &Identification) -> Verdict {
     }
     checks.extend(explained(id));
     checks.extend(residual(id));
+    checks.extend(position(id));
     checks.extend(loads(id));
     checks.extend(clearance(id));
     checks.extend(delay(id));
@@ -342,10 +343,38 @@ fn residual(id: &Identification) -> Option<CheckResult> {
     ))
 }
 
+/// What is left over that is a slow function of the position of a joint, if that is beyond chance.
+fn position(id: &Identification) -> Option<CheckResult> {
+    let outputs = dynid_model::EffortModel::outputs(&id.model);
+    let worst = id.slow.iter().map(|s| s.found.share).reduce(f64::max)?;
+    let named: Vec<String> = (id.slow.iter())
+        .map(|s| {
+            let (share, error) = (100.0 * s.found.share, 100.0 * s.found.standard_error);
+            format!("`{}` ({share:.0} ± {error:.0} %)", outputs[s.output].name)
+        })
+        .collect();
+    Some(check(
+        Status::Warn,
+        CheckName::Position,
+        Some(100.0 * worst),
+        "%",
+        "below 20 % of the mean square residual on held-out parts of the motion, or within three standard errors",
+        format!(
+            "the residual of {} is a function of the joint's position: a gravity compensator, a spring, a cable, a gear that is not round, or an axis              that is not where the robot file has it; standard deviations do not cover it",
+            named.join(", ")
+        ),
+    ))
+}
+
 /// Checks that tell whether the residual is noise: where one does not pass, what the model leaves out may speak against ties that
 /// are right.
-const OF_RESIDUAL: [CheckName; 4] =
-    [CheckName::Residual, CheckName::Delay, CheckName::ReversalMask, CheckName::Whiteness];
+const OF_RESIDUAL: [CheckName; 5] = [
+    CheckName::Residual,
+    CheckName::Position,
+    CheckName::Delay,
+    CheckName::ReversalMask,
+    CheckName::Whiteness,
+];
 
 /// Whether the logs bear out what ties say. `checks`: the others.
 fn ties(id: &Identification, checks: &[CheckResult]) -> Option<CheckResult> {

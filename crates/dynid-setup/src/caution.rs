@@ -20,7 +20,7 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 38] = [
+const ORDER: [&str; 39] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
@@ -41,6 +41,7 @@ const ORDER: [&str; 38] = [
     CheckName::Stiffness.word(),
     CheckName::Instruments.word(),
     CheckName::ClosedLoopBias.word(),
+    CheckName::Position.word(),
     CheckName::Residual.word(),
     CheckName::Delay.word(),
     CheckName::ReversalMask.word(),

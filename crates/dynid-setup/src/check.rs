@@ -40,6 +40,8 @@ dynid_record::words! {
         Recipe = "recipe of the factors",
         /// What is left over against sensor noise.
         Residual = "residual against sensor noise",
+        /// What is left over that is a function of the position of a joint.
+        Position = "residual that follows the position",
         /// Dependence on rows near reversal.
         ReversalMask = "sensitivity to the reversal mask",
         /// Robots behind standard deviations.

@@ -276,7 +276,7 @@ impl ElementPlan {
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
     }
 
-    /// Adds a cyclic effort to a joint, its order the start of a search within what orders are told apart by.
+    /// Adds a cyclic effort to a joint, its order the start of a search within what orders are told apart by, or held where it is a whole number.
     pub fn add_cyclic(&mut self, rate: usize, joint: &str, found: &CyclicFinding) {
         let (name, key) = cyclic_element(found.is_friction);
         self.per_rate[rate].push(name.to_owned());
@@ -286,7 +286,7 @@ impl ElementPlan {
             number("start", found.cycles),
             number("lower", found.cycles - reach),
             number("upper", found.cycles + reach),
-            (format!("{key}.held"), SettingValue::Flag(false)),
+            (format!("{key}.held"), SettingValue::Flag(reach == 0.0)),
         ];
         self.spec.settings.extend(settings.map(|(key, value)| ElementSetting {
             joint: joint.to_owned(),

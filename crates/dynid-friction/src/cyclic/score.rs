@@ -2,11 +2,12 @@
 
 use dynid_linalg::Mat;
 
-use super::Row;
+use super::rows::Row;
 
-/// Columns beside the two of the order: what a residual may hold of offset, Coulomb and viscous friction.
-const BESIDE: usize = 3;
+/// Columns of an order, of what a residual may hold of offset, Coulomb and viscous friction beside it, and the residual.
 const COLUMNS: usize = 2 + BESIDE;
+/// The latter two.
+pub(super) const BESIDE: usize = 4;
 /// Keeps normal equations solvable where the motion does not tell columns apart, in parts of their diagonal.
 const RIDGE: f64 = 1e-9;
 
@@ -29,75 +30,99 @@ pub(super) struct Score {
 }
 
 /// Sums of products of the columns of rows, the residual last.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums([[f64; COLUMNS + 1]; COLUMNS + 1]);
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sums<const N: usize>([[f64; N]; N]);
 
-impl Sums {
-    fn add(&mut self, row: &[f64; COLUMNS + 1]) {
+impl<const N: usize> Sums<N> {
+    pub(super) const ZERO: Self = Sums([[0.0; N]; N]);
+
+    pub(super) fn add(&mut self, row: &[f64; N]) {
         for (to, a) in self.0.iter_mut().zip(row) {
             to.iter_mut().zip(row).for_each(|(s, b)| *s += a * b);
         }
     }
 
-    fn less(&self, other: &Sums) -> Sums {
+    fn less(&self, other: &Self) -> Self {
         Sums(std::array::from_fn(|i| std::array::from_fn(|j| self.0[i][j] - other.0[i][j])))
     }
 
-    fn plus(&self, other: &Sums) -> Sums {
+    fn plus(&self, other: &Self) -> Self {
         Sums(std::array::from_fn(|i| std::array::from_fn(|j| self.0[i][j] + other.0[i][j])))
     }
 
-    /// Least squares with the columns from `first` on; zeros for those before.
-    fn solve(&self, first: usize) -> Option<[f64; COLUMNS]> {
-        let scale: [f64; COLUMNS] = std::array::from_fn(|k| self.0[k][k].sqrt().max(f64::MIN_POSITIVE));
+    /// Least squares with the columns from `first` on; zeros for those before, -1 for the residual.
+    fn solve(&self, first: usize) -> Option<[f64; N]> {
+        let scale: [f64; N] = std::array::from_fn(|k| self.0[k][k].sqrt().max(f64::MIN_POSITIVE));
         let ridge = |i: usize, j: usize| if i == j { RIDGE } else { 0.0 };
         let entry = |i: usize, j: usize| {
             let (i, j) = (first + i, first + j);
             self.0[i][j] / (scale[i] * scale[j]) + ridge(i, j)
         };
-        let count = COLUMNS - first;
-        let right: Vec<f64> = (first..COLUMNS).map(|k| self.0[k][COLUMNS] / scale[k]).collect();
+        let (last, count) = (N - 1, N - 1 - first);
+        let right: Vec<f64> = (first..last).map(|k| self.0[k][last] / scale[k]).collect();
         let x = Mat::from_fn(count, count, entry).cholesky()?.solve_vector(&right);
-        Some(std::array::from_fn(|k| if k < first { 0.0 } else { x[k - first] / scale[k] }))
+        Some(std::array::from_fn(|k| match k {
+            k if k < first => 0.0,
+            k if k == last => -1.0,
+            k => x[k - first] / scale[k],
+        }))
     }
 
-    fn rss(&self, x: &[f64; COLUMNS]) -> f64 {
-        let factor = |k: usize| if k < COLUMNS { -x[k] } else { 1.0 };
-        (0..=COLUMNS).map(|i| (0..=COLUMNS).map(|j| factor(i) * factor(j) * self.0[i][j]).sum::<f64>()).sum()
+    fn rss(&self, x: &[f64; N]) -> f64 {
+        let row = |(s, xi): (&[f64; N], &f64)| xi * s.iter().zip(x).map(|(s, xj)| s * xj).sum::<f64>();
+        self.0.iter().zip(x).map(row).sum()
     }
+}
+
+/// Squares of every part with the columns from `first` on and with all columns, each fitted to the other parts; parts without rows are left out, and
+/// those that have nothing to gain.
+fn held_out<const N: usize>(sums: &[Sums<N>], first: usize) -> Vec<(f64, f64)> {
+    let all = sums.iter().fold(Sums::ZERO, |all, part| all.plus(part));
+    let squares = |part: &Sums<N>| {
+        let others = all.less(part);
+        let (without, with) = (part.rss(&others.solve(first)?), part.rss(&others.solve(0)?));
+        (without > 0.0 && with > 0.0).then_some((without, with))
+    };
+    // The column of the offset tells rows.
+    sums.iter().filter(|part| part.0[N - BESIDE][N - BESIDE] > 0.0).filter_map(squares).collect()
+}
+
+/// What the first columns, those before [`BESIDE`], gain on held-out parts, all parts alike; `None` where fewer than two can be judged.
+pub(super) fn gain<const N: usize>(sums: &[Sums<N>]) -> Option<Gain> {
+    let pairs = held_out(sums, N - BESIDE);
+    (pairs.len() >= 2).then(|| of_parts(&pairs))
+}
+
+/// Columns beside those that are looked for, and the residual, weighted.
+pub(super) fn beside(row: &Row) -> [f64; BESIDE] {
+    [1.0, row.velocity.signum(), row.velocity, row.residual].map(|x| row.weight * x)
 }
 
 /// Weighted columns of a row, the residual last.
-fn columns(row: &Row, n: f64, is_friction: bool, kernel_s: f64) -> [f64; COLUMNS + 1] {
-    let sign = row.velocity.signum();
+fn columns(row: &Row, n: f64, is_friction: bool, kernel_s: f64) -> [f64; COLUMNS] {
     let (sine, cosine) = (n * row.position).sin_cos();
-    let of_order = row.passes(n, kernel_s) * if is_friction { sign } else { 1.0 };
-    [of_order * cosine, of_order * sine, 1.0, sign, row.velocity, row.residual].map(|x| row.weight * x)
+    let factor = row.weight * row.passes(n, kernel_s) * if is_friction { row.velocity.signum() } else { 1.0 };
+    let [offset, sign, velocity, residual] = beside(row);
+    [factor * cosine, factor * sine, offset, sign, velocity, residual]
 }
 
-fn per_part(rows: &[Row], parts: usize, n: f64, is_friction: bool, kernel_s: f64) -> (Vec<Sums>, Sums) {
-    let mut sums = vec![Sums::default(); parts];
-    for row in rows {
-        sums[row.part].add(&columns(row, n, is_friction, kernel_s));
-    }
-    let all = sums.iter().fold(Sums::default(), |all, part| all.plus(part));
-    (sums, all)
+fn summed(rows: &[Row], n: f64, is_friction: bool, kernel_s: f64) -> Sums<COLUMNS> {
+    let mut all = Sums::ZERO;
+    rows.iter().for_each(|row| all.add(&columns(row, n, is_friction, kernel_s)));
+    all
 }
 
 /// Fits an order without each part and judges it there; `None` where no part can be judged.
 pub(super) fn score(rows: &[Row], parts: usize, n: f64, is_friction: bool, kernel_s: f64) -> Option<Score> {
-    let (sums, all) = per_part(rows, parts, n, is_friction, kernel_s);
-    let squares = |part: &Sums| {
-        let others = all.less(part);
-        let (without, with) = (part.rss(&others.solve(2)?), part.rss(&others.solve(0)?));
-        (without > 0.0 && with > 0.0).then_some((without, with))
-    };
-    // Parts without rows say nothing.
-    let pairs: Vec<(f64, f64)> = sums.iter().filter(|part| part.0[2][2] > 0.0).filter_map(squares).collect();
+    let mut sums = vec![Sums::ZERO; parts];
+    for row in rows {
+        sums[row.part].add(&columns(row, n, is_friction, kernel_s));
+    }
+    let pairs = held_out(&sums, 2);
     if pairs.len() < 2 {
         return None;
     }
-    let [a, b, ..] = all.solve(0)?;
+    let [a, b, ..] = sums.iter().fold(Sums::ZERO, |all, part| all.plus(part)).solve(0)?;
     Some(Score { of_parts: of_parts(&pairs), of_sum: of_sum(&pairs), coefficients: [a, b] })
 }
 
@@ -121,18 +146,15 @@ fn of_sum(pairs: &[(f64, f64)]) -> Gain {
 
 /// Weighted residual sum of squares of the fit of an order to all rows.
 pub(super) fn rss(rows: &[Row], n: f64, is_friction: bool, kernel_s: f64) -> f64 {
-    let mut all = Sums::default();
-    rows.iter().for_each(|row| all.add(&columns(row, n, is_friction, kernel_s)));
+    let all = summed(rows, n, is_friction, kernel_s);
     all.solve(0).map_or(f64::INFINITY, |x| all.rss(&x))
 }
 
 /// Takes off residuals what offset, Coulomb and viscous friction may be in them.
 pub(super) fn without_friction(rows: &mut [Row]) {
-    let mut all = Sums::default();
-    rows.iter().for_each(|row| all.add(&columns(row, 0.0, false, 0.0)));
-    let Some(x) = all.solve(2) else { return };
+    let Some([.., offset, sign, velocity, _]) = summed(rows, 0.0, false, 0.0).solve(2) else { return };
     for row in rows {
-        row.residual -= x[2] + x[3] * row.velocity.signum() + x[4] * row.velocity;
+        row.residual -= offset + sign * row.velocity.signum() + velocity * row.velocity;
     }
 }
 

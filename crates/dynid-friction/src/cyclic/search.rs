@@ -2,61 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::Row;
+use super::rows::{CyclicRows, CyclicSettings, Row, moving, passes, range};
 use super::score::{Gain, Score, rss, score, without_friction, without_order};
+use super::slow::{is_slow, slow_gain};
 use super::spectrum::spectrum;
-
-/// Rows of one joint's residuals behind a Gaussian kernel.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct CyclicRows {
-    /// Position, rad or m.
-    pub position: Vec<f64>,
-    /// Velocity, rad/s or m/s.
-    pub velocity: Vec<f64>,
-    /// Measured less predicted effort, N m or N.
-    pub residual: Vec<f64>,
-    /// Weight: 1 over the standard deviation of the rows of the log.
-    pub weight: Vec<f64>,
-    /// Part of the motion that a row lies in, below `parts`: rows of one part are held out together. Where a motion repeats, the same places
-    /// of all periods are one part.
-    pub part: Vec<usize>,
-    /// Number of parts.
-    pub parts: usize,
-    /// Standard deviation of the kernel, s.
-    pub kernel_s: f64,
-}
-
-/// When a cyclic effort is believed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CyclicSettings {
-    /// Fewest periods over the range of the joint. What repeats less often is a slow change with position, which another motion need not share.
-    /// Default 3.
-    pub least_periods: f64,
-    /// Standard errors that the gain on held-out parts must be of: so many that hundreds of orders which are tried do not pass by chance. Default 3.
-    pub sigmas: f64,
-    /// Share of the mean square residual that must be gone on held-out parts, all parts alike. Default 0.03.
-    pub least_gain: f64,
-    /// Or share of the sum of squares of all parts, in which a few may tell all. Default 0.1.
-    pub least_gain_of_sum: f64,
-    /// Fewest parts that hold rows. Default 8.
-    pub least_parts: usize,
-    /// Fewest passes of the joint, from turn to turn. On a single one a vibration, which repeats in time, looks like ripple; a place that is passed
-    /// again finds it in another phase. Default 4.
-    pub least_passes: usize,
-}
-
-impl Default for CyclicSettings {
-    fn default() -> Self {
-        CyclicSettings {
-            least_periods: 3.0,
-            sigmas: 3.0,
-            least_gain: 0.03,
-            least_gain_of_sum: 0.1,
-            least_parts: 8,
-            least_passes: 4,
-        }
-    }
-}
 
 /// A cyclic effort found in residuals, `w (A cos nq + B sin nq)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +14,7 @@ pub struct CyclicFinding {
     pub is_friction: bool,
     /// Repetitions `n` per turn (per `2π` metres for joints that slide).
     pub cycles: f64,
-    /// A quarter of the distance of orders that the range of the joint tells apart.
+    /// A quarter of the distance of orders that the range of the joint tells apart; 0 for a slow order, which is a whole number.
     pub resolution: f64,
     /// Amplitude `√(A² + B²)`, N m or N.
     pub amplitude: f64,
@@ -75,8 +24,6 @@ pub struct CyclicFinding {
     pub standard_error: f64,
 }
 
-/// Slower rows, in parts of the rms speed, count as rest.
-const REST: f64 = 0.05;
 /// Share of the rows that is slow enough for the largest order to pass the kernel.
 const SLOWEST: f64 = 0.2;
 /// Peaks of a spectrum that are judged.
@@ -90,7 +37,7 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The cyclic efforts that residuals of a joint show: at most one torque and one friction, the one that gains more first.
 ///
-/// The order `n` is looked for between `least_periods` over the range of the joint and the largest whose ripple passes the kernel in a fifth of
+/// The order `n` is a small whole number or is looked for between `least_periods` over the range of the joint and the largest whose ripple passes the kernel in a fifth of
 /// the rows. At a row the kernel leaves `exp(-½ (n v σ)²)` of a ripple, `v` its speed, `σ` the kernel's standard deviation. Peaks of the spectrum
 /// over position are fitted without one part of the motion each and judged there; what passes is taken off before more is looked for.
 ///
@@ -114,54 +61,52 @@ struct Search<'a> {
     kernel_s: f64,
     range: (f64, f64),
     orders: (f64, f64),
+    slow: Vec<f64>,
 }
 
 impl<'a> Search<'a> {
     /// `None` where no order can be told.
     fn new(given: &CyclicRows, settings: &'a CyclicSettings) -> Option<Self> {
-        let CyclicRows { position, velocity, residual, weight, part, parts, kernel_s } = given;
-        let lengths = [position.len(), velocity.len(), residual.len(), weight.len(), part.len()];
-        assert!(lengths.iter().all(|n| *n == lengths[0]), "lists of {lengths:?} rows");
-        let square: f64 = velocity.iter().map(|v| v * v).sum();
-        let rest = REST * (square / lengths[0].max(1) as f64).sqrt();
-        let mut rows: Vec<Row> = (0..lengths[0])
-            .filter(|k| velocity[*k].abs() > rest)
-            .map(|k| Row {
-                position: position[k],
-                velocity: velocity[k],
-                residual: residual[k],
-                weight: weight[k],
-                part: part[k],
-            })
-            .collect();
-        let mut held = vec![false; *parts];
-        rows.iter().for_each(|row| held[row.part] = true);
-        if rows.is_empty() || held.iter().filter(|held| **held).count() < settings.least_parts {
+        let mut rows = moving(given, settings.least_parts)?;
+        if passes(&rows) < settings.least_passes {
             return None;
         }
-        let turns = rows.windows(2).filter(|w| w[0].velocity.signum() != w[1].velocity.signum()).count();
-        if turns + 1 < settings.least_passes {
-            return None;
-        }
+        let (parts, kernel_s) = (&given.parts, &given.kernel_s);
         let mut speeds: Vec<f64> = rows.iter().map(|r| r.velocity.abs()).collect();
         let place = (SLOWEST * (speeds.len() - 1) as f64) as usize;
         let slow = *speeds.select_nth_unstable_by(place, f64::total_cmp).1;
-        let low = rows.iter().map(|r| r.position).fold(f64::INFINITY, f64::min);
-        let high = rows.iter().map(|r| r.position).fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = range(&rows);
         let orders = (settings.least_periods * TAU / (high - low), 1.0 / (kernel_s * slow));
-        if !(orders.0 < orders.1 && orders.1.is_finite()) {
+        if !(orders.0.is_finite() && orders.1.is_finite()) {
             return None;
         }
         without_friction(&mut rows);
-        Some(Search { settings, rows, parts: *parts, kernel_s: *kernel_s, range: (low, high), orders })
+        let slow =
+            (1..=settings.slow_orders).map(f64::from).filter(|n| !given.slides && *n < orders.0).collect();
+        Some(Search { settings, rows, parts: *parts, kernel_s: *kernel_s, range: (low, high), orders, slow })
     }
 
     /// The best of the kinds that passes, taken off the residuals.
     fn next(&mut self, kinds: &[bool]) -> Option<CyclicFinding> {
-        let lines = spectrum(&self.rows, self.kernel_s, self.range, self.orders);
+        let lines = match self.orders.0 < self.orders.1 {
+            true => spectrum(&self.rows, self.kernel_s, self.range, self.orders),
+            false => Vec::new(),
+        };
         let resolution = PI / (2.0 * (self.range.1 - self.range.0));
         let mut best: Option<(bool, f64, Gain, [f64; 2])> = None;
+        let judged = |n: f64, is_friction: bool| score(&self.rows, self.parts, n, is_friction, self.kernel_s);
+        let better = |gain: &Gain, best: &Option<(bool, f64, Gain, [f64; 2])>| {
+            best.as_ref().is_none_or(|(_, _, other, _)| gain.share > other.share)
+        };
         for is_friction in kinds {
+            // One order alone may be a chance of the places that a motion passes: the residual is to be a function of the position as a whole.
+            let slow = slow_gain(&self.rows, self.parts, *is_friction, self.settings).map(|_| &self.slow);
+            for cycles in slow.into_iter().flatten() {
+                let Some(found) = judged(*cycles, *is_friction) else { continue };
+                if is_slow(&found.of_parts, self.settings) && better(&found.of_parts, &best) {
+                    best = Some((*is_friction, *cycles, found.of_parts, found.coefficients));
+                }
+            }
             let share = |k: usize| lines[k].shares[usize::from(*is_friction)];
             let worth = NEAR * self.settings.least_gain;
             let is_peak = |k: &usize| {
@@ -172,14 +117,14 @@ impl<'a> Search<'a> {
             let mut peaks: Vec<usize> = (0..lines.len()).filter(is_peak).collect();
             peaks.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
             for k in peaks.into_iter().take(TRIED) {
-                let judged = |n: f64| score(&self.rows, self.parts, n, *is_friction, self.kernel_s);
-                if judged(lines[k].order).and_then(|found| self.passes(&found, NEAR)).is_none() {
+                if judged(lines[k].order, *is_friction).and_then(|found| self.passes(&found, NEAR)).is_none()
+                {
                     continue;
                 }
                 let cycles = self.refined(lines[k].order, *is_friction, resolution);
-                let Some(found) = judged(cycles) else { continue };
+                let Some(found) = judged(cycles, *is_friction) else { continue };
                 let Some(gain) = self.passes(&found, 1.0) else { continue };
-                if best.is_none_or(|(_, _, other, _)| gain.share > other.share) {
+                if better(&gain, &best) {
                     best = Some((*is_friction, cycles, gain, found.coefficients));
                 }
             }
@@ -189,6 +134,7 @@ impl<'a> Search<'a> {
         let [a, b] = coefficients;
         let amplitude = a.hypot(b);
         let (gain, standard_error) = (gain.share, gain.error);
+        let resolution = if self.slow.contains(&cycles) { 0.0 } else { resolution };
         Some(CyclicFinding { is_friction, cycles, resolution, amplitude, gain, standard_error })
     }
 
@@ -227,6 +173,7 @@ impl<'a> Search<'a> {
 mod tests {
     use rand::{RngExt as _, SeedableRng as _};
 
+    use super::super::find_slow;
     use super::*;
 
     /// 60 s of a joint at 200 rows/s with white noise of deviation 1 behind no kernel to speak of.
@@ -263,6 +210,24 @@ mod tests {
     }
 
     #[test]
+    fn what_repeats_with_the_turn_of_the_joint_has_a_whole_order() {
+        let [spring] = found(|q, _| 0.9 * (2.0 * q + 0.3).sin())[..] else { panic!("one torque") };
+        assert!(!spring.is_friction && spring.cycles == 2.0 && spring.resolution == 0.0, "{spring:?}");
+        assert!((spring.amplitude - 0.9).abs() < 0.05 && spring.gain > 0.2, "{spring:?}");
+        let [gear] = found(|q, v| v.signum() * 1.5 * (2.0 * q).cos())[..] else { panic!("one friction") };
+        assert!(gear.is_friction && gear.cycles == 2.0, "{gear:?}");
+        let settings = CyclicSettings::default();
+        let mut slides = rows(|q, _| 0.9 * (2.0 * q + 0.3).sin());
+        slides.slides = true;
+        assert_eq!(find_cyclic(&slides, &settings), [], "no turn");
+        // Whatever function of the position it is, the residual says that it is one.
+        let step = |q: f64, _: f64| if q > 0.4 { 1.0 } else { -1.0 };
+        let found = find_slow(&rows(step), &settings).unwrap();
+        assert!(found.share > 0.3 && found.share > 5.0 * found.standard_error, "{found:?}");
+        assert_eq!(find_slow(&rows(|_, v| v.signum() + 0.3 * v), &settings), None);
+    }
+
+    #[test]
     fn both_kinds_are_found_beside_each_other() {
         let both = found(|q, v| 0.6 * (50.3 * q).sin() + v.signum() * 0.8 * (31.0 * q).cos());
         let kinds: Vec<bool> = both.iter().map(|f| f.is_friction).collect();
@@ -272,7 +237,11 @@ mod tests {
     #[test]
     fn noise_and_what_changes_slowly_are_no_ripple() {
         assert_eq!(found(|_, _| 0.0), []);
-        assert_eq!(found(|q, _| 0.8 * (2.0 * q).sin()), [], "less than three periods over the range");
+        assert_eq!(
+            found(|q, _| 0.3 * (2.0 * q).sin()),
+            [],
+            "a twentieth of the residual: another motion need not share it"
+        );
         assert_eq!(found(|_, v| v.signum() + 0.3 * v), [], "friction that is left");
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use dynid_motion::spectrum::Periodogram;
 
-use super::Row;
+use super::rows::Row;
 
 /// Length of the transform in ranges of the joint: orders are then a quarter of what the range tells apart from each other.
 const RANGES: f64 = 4.0;

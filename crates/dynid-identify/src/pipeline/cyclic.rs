@@ -1,7 +1,7 @@
 //! Efforts that repeat with the position of a joint, which the residuals of a fit show.
 
 use dynid_estimate::separable::ShapeFinding;
-use dynid_friction::cyclic::{CyclicFinding, CyclicRows, CyclicSettings, find_cyclic};
+use dynid_friction::cyclic::{CyclicFinding, CyclicRows, CyclicSettings, find_cyclic, find_slow};
 use dynid_model::{EffortModel, ShapeParameter};
 use dynid_motion::Kernel;
 use dynid_rows::conditioning::{Conditioning, LogMotion, PreparedLog, motions, parts_of_motions};
@@ -12,7 +12,7 @@ use super::model_fit::ModelFit;
 use super::shapes::Before;
 use crate::Error;
 use crate::elements::cyclic_element;
-use crate::joint_cyclic::JointCyclic;
+use crate::joint_cyclic::{JointCyclic, JointSlow};
 use crate::problem::Problem;
 use crate::settings::Friction;
 use crate::shape::{ShapeFit, Start};
@@ -35,6 +35,7 @@ impl Problem {
             _ => Vec::new(),
         };
         if found.is_empty() {
+            fit.slow = slow(&self, &fit);
             return Ok((self, fit));
         }
         for JointCyclic { output, found } in &found {
@@ -46,7 +47,8 @@ impl Problem {
         let start = beside(before.as_ref(), &self.model.parameters().shape);
         let start = Before::Found { friction: std::mem::take(&mut fit.friction), start };
         let (problem, fit) = self.fit_from(fit.conditioning.take(), start, progress)?;
-        Ok((problem, ModelFit { cyclic: found, ..fit }))
+        let slow = slow(&problem, &fit);
+        Ok((problem, ModelFit { cyclic: found, slow, ..fit }))
     }
 }
 
@@ -66,11 +68,31 @@ fn beside(found: Option<&ShapeFit>, parameters: &[ShapeParameter]) -> Start {
     Start::Beside(values, known.into_iter().map(|known| Some(known?.1)).collect())
 }
 
+/// What the residuals of joints hold of slow functions of the position, beyond chance.
+fn slow(problem: &Problem, fit: &ModelFit) -> Vec<JointSlow> {
+    let Some(choices) = &fit.conditioning else { return Vec::new() };
+    let Problem { model, logs, .. } = problem;
+    let parts = Parts::of(logs);
+    let outputs: Vec<usize> = (0..model.outputs().len()).filter(|o| !model.is_undriven(*o)).collect();
+    let found: Vec<Option<JointSlow>> = outputs
+        .par_iter()
+        .map(|output| {
+            let rows = rows(*output, problem, fit, &parts, choices.kernel_hz);
+            let found = find_slow(&rows, &CyclicSettings::default())?;
+            Some(JointSlow { output: *output, found })
+        })
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
 /// Cyclic efforts of the joints that may take some.
 fn find(problem: &Problem, fit: &ModelFit, choices: &Conditioning) -> Vec<JointCyclic> {
     let Problem { model, plan, logs, .. } = problem;
     let parts = Parts::of(logs);
-    let settings = CyclicSettings::default();
+    // An estimator of a program's own need not leave the least residual, which then follows the position as gravity does.
+    let whole = CyclicSettings::default();
+    let slow_orders = if problem.settings.own_estimator.is_some() { 0 } else { whole.slow_orders };
+    let settings = CyclicSettings { slow_orders, ..whole };
     let may = |output: &usize| {
         let (rate, name) = (model.tree_rate(*output), &model.outputs()[*output].name);
         let own = &plan.per_rate[rate];
@@ -82,7 +104,7 @@ fn find(problem: &Problem, fit: &ModelFit, choices: &Conditioning) -> Vec<JointC
     let outputs: Vec<usize> = (0..model.outputs().len()).filter(may).collect();
     let found: Vec<Vec<CyclicFinding>> = outputs
         .par_iter()
-        .map(|output| find_cyclic(&rows(*output, fit, logs, &parts, choices.kernel_hz), &settings))
+        .map(|output| find_cyclic(&rows(*output, problem, fit, &parts, choices.kernel_hz), &settings))
         .collect();
     let of_output = |(output, found): (&usize, Vec<CyclicFinding>)| {
         let output = *output;
@@ -129,9 +151,11 @@ impl Parts {
 }
 
 /// Rows of the widest kernel of one output, in all logs that move it.
-fn rows(output: usize, fit: &ModelFit, logs: &[PreparedLog], parts: &Parts, kernel_hz: f64) -> CyclicRows {
+fn rows(output: usize, problem: &Problem, fit: &ModelFit, parts: &Parts, kernel_hz: f64) -> CyclicRows {
+    let logs = &problem.logs;
     let kernel_s = Kernel::standard_deviation_at(kernel_hz);
-    let mut out = CyclicRows { parts: parts.count, kernel_s, ..CyclicRows::default() };
+    let slides = problem.model.joints()[output].slides;
+    let mut out = CyclicRows { parts: parts.count, kernel_s, slides, ..CyclicRows::default() };
     for (log, rows) in fit.residuals.of_output(output) {
         let prepared = &logs[log];
         if !prepared.moves[output] || prepared.held[output] {

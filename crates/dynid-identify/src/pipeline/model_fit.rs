@@ -10,7 +10,7 @@ use crate::closed_loop::{self, Loop, LoopFit, LoopRun};
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::friction_power::{self, FrictionPower};
-use crate::joint_cyclic::JointCyclic;
+use crate::joint_cyclic::{JointCyclic, JointSlow};
 use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
 use crate::settings::Settings;
@@ -25,6 +25,8 @@ pub struct ModelFit {
     pub friction: Vec<JointFriction>,
     /// Cyclic efforts that joints took.
     pub cyclic: Vec<JointCyclic>,
+    /// What the residuals of joints hold of slow functions of their positions.
+    pub slow: Vec<JointSlow>,
     /// Shape parameters as found.
     pub shapes: Option<ShapeFit>,
     /// How the simulations went, for estimators that simulate the closed loop.
@@ -90,6 +92,7 @@ impl Problem {
             conditioning,
             friction,
             cyclic: Vec::new(),
+            slow: Vec::new(),
             shapes,
             simulations: run,
             residuals: measured,

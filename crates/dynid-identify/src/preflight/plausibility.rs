@@ -6,7 +6,7 @@ use dynid_rows::preflight::{AgainstStated, GaussianPrior, Trial, Wiring, against
 
 use super::bench::Bench;
 use crate::Error;
-use crate::effort_scale::{G, GRAVITY_SHARE, states_bodies};
+use crate::effort_scale::{G, GRAVITY_SHARE};
 use crate::finding::{FindingId, Findings, Fix, Severity};
 use crate::prior::Prior;
 
@@ -94,7 +94,7 @@ pub(super) fn examine(
     {
         return Ok(());
     }
-    let file = match states_bodies(prior) {
+    let file = match prior.states_bodies() {
         true => from_file(bench, trial, (wiring, applied), prior, (&identified, &stated))?,
         false => None,
     };
@@ -177,7 +177,7 @@ fn upside_down(
     if !is_clearly_better(trial, wiring, gravity) {
         return false;
     }
-    let told = states_bodies(prior);
+    let told = prior.states_bodies();
     let bodies = if told { "that the robot file states" } else { "half way along its links" };
     let evidence = format!(
         "gravity pulls the other way than on bodies {bodies}: gravity points the other way, or all efforts and positions count the other way"

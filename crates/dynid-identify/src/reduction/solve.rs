@@ -117,6 +117,7 @@ impl Recipe {
             conditioning: Some(self.conditioning(&rates)),
             friction: Vec::new(),
             cyclic: Vec::new(),
+            slow: Vec::new(),
             shapes,
             simulations: None,
             residuals: RowResiduals::none(),

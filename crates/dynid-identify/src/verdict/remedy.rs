@@ -76,6 +76,11 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
              `known_friction = \"friction.json\"` under `[elements]`; a joint behind a soft gear: `elastic` in the robot file",
             files.compare()
         ),
+        CheckName::Position => format!(
+            "a spring that carries the link: `beside = [\"balancer\"]` and its geometry under `[element.{0}]` of the robot file; a torsion spring: \
+             `beside = [\"spring\"]`; anything else: a `[law.NAME]` whose columns read `q`; a joint or a load that is not where the file has it: put it right there",
+            following(id)
+        ),
         CheckName::Delay => "state the delay, if you know it: `delay_samples = 0.5` under `[conditioning]`; a friction law that bends: \
                   `friction = \"stribeck\"` under `[elements]`"
             .to_owned(),
@@ -110,6 +115,13 @@ fn scale(id: &Identification) -> String {
 fn unexplained(id: &Identification) -> &str {
     let outputs = dynid_model::EffortModel::outputs(&id.model);
     outputs.iter().zip(&id.explained).find(|(_, e)| !**e).map_or("joint", |(o, _)| &o.name)
+}
+
+/// The joint whose residual follows its position most.
+fn following(id: &Identification) -> &str {
+    let outputs = dynid_model::EffortModel::outputs(&id.model);
+    let most = id.slow.iter().max_by(|a, b| a.found.share.total_cmp(&b.found.share));
+    most.map_or("joint", |s| &outputs[s.output].name)
 }
 
 /// A log of the length that blocks want.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::{Arc, LazyLock};
 
 use super::formula::{FormulaAtJoint, FormulaLaw, FormulaTerms};
-use super::{JointElement, LinearTerm, Placement, ShapeSetting, ShapeTerm};
+use super::{JointElement, LinearTerm, ShapeSetting, ShapeTerm};
 
 const LENGTH: [&str; 2] = ["m", "m"];
 
@@ -44,9 +44,9 @@ static LAW: LazyLock<Arc<FormulaLaw>> = LazyLock::new(|| {
 /// The element at a joint.
 ///
 /// Both radii enter alike, so the larger one is `ba`; were they equal, the spring could have no length.
-pub(super) fn place(placement: &Placement<'_>) -> Result<Box<dyn JointElement>, String> {
+pub(super) fn place(rate: usize, shape: &[ShapeSetting]) -> Result<Box<dyn JointElement>, String> {
     let range = |s: &ShapeSetting| if s.held { (s.start, s.start) } else { (s.lower, s.upper) };
-    let (ground, link) = (&placement.shape[0], &placement.shape[1]);
+    let (ground, link) = (&shape[0], &shape[1]);
     let ((least, _), (_, most)) = (range(ground), range(link));
     if most >= least {
         return Err(format!(
@@ -58,5 +58,5 @@ pub(super) fn place(placement: &Placement<'_>) -> Result<Box<dyn JointElement>, 
             "`ba` and `br` are both to be found, and efforts tell their ratio alone: state `ba`".to_owned()
         );
     }
-    Ok(Box::new(FormulaAtJoint { rate: placement.rate, law: LAW.clone(), shape: placement.shape.to_vec() }))
+    Ok(Box::new(FormulaAtJoint { rate, law: LAW.clone(), shape: shape.to_vec() }))
 }

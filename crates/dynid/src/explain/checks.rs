@@ -47,6 +47,13 @@ pub(super) fn text(name: Name) -> Text {
             "Run the pre-flight; see whether the joint moves and whether its effort is logged in the right column.",
             "dynid check LOG --robot ROBOT",
         ),
+        Name::Position => Text(
+            "What the model leaves over of these joints is a function of their position, on parts of the motion that it was not fitted to: a gravity \
+             compensator, a spring, a cable, a gear that is not round, or an axis that is not where the robot file has it. Efforts of up to three whole \
+             repetitions a turn are taken by themselves; this is what remains.",
+            "State what acts there: a spring beside the joint by its geometry, a torsion spring, or a law of the position.",
+            "[element.j2]\nbeside = [\"balancer\"]\nbalancer = { ba = 0.55, br = 0.12, bphi = 0.35 }",
+        ),
         Name::Instruments => Text(
             "The estimators `iv`, `didim` and `cloe` simulate the closed loop. The check says whether the simulations settled, whether instruments \
              resemble the measured motion, and whether the parameters of the other two explain the measured efforts as least squares does.",

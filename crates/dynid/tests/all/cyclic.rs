@@ -119,3 +119,47 @@ fn joints_without_ripple_take_none() {
     let found = estimate(folder.path(), "");
     assert!(found.conditioning.cyclic_efforts.is_empty(), "{:?}", found.conditioning.cyclic_efforts);
 }
+
+/// A spring that carries the first link, of which the robot file knows nothing: its effort is no gravity, and follows the position.
+#[test]
+fn an_unknown_gravity_compensator_is_taken_for_a_slow_effort_of_the_joint() {
+    let folder = tempfile::tempdir().unwrap();
+    let geometry = "balancer = { ba = 0.4, br = 0.25, bphi = 0.4 }\n";
+    let plain: String = TRUTH
+        .replace("\"cyclic_friction\"", "\"offset\"")
+        .replace("\"offset\", \"rotor\", \"offset\"", "\"offset\", \"rotor\"");
+    let plain: String =
+        plain.lines().filter(|l| !l.starts_with("cyclic")).map(|l| format!("{l}\n")).collect();
+    let truth = plain
+        .replace("\"cyclic\"", "\"balancer\"")
+        .replace("[element.j2]", &format!("{geometry}[element.j2]"));
+    let values = [("j1.bk", 100.0), ("j1.bf", 20.0)];
+    bench(folder.path(), &truth, &values);
+    log(folder.path(), "other.csv", 8, &truth, &values);
+    let validation = "[[validation]]\npath = \"other.csv\"";
+    let found = estimate(folder.path(), validation);
+    let [slow] = &found.conditioning.cyclic_efforts[..] else {
+        panic!("{:?}", found.conditioning.cyclic_efforts)
+    };
+    assert!(slow.joint == "j1" && slow.element == "cyclic" && slow.cycles.fract() == 0.0, "{slow:?}");
+    let choice = found.conditioning.choices.iter().find(|c| c.name == "cyclic efforts of j1").unwrap();
+    assert!(choice.reason.contains("`beside = [\"balancer\"]`"), "{}", choice.reason);
+    let given = estimate(folder.path(), &format!("friction = \"given\"\n{validation}"));
+    let told =
+        given.verdict.checks.iter().find(|c| c.name.word() == "residual that follows the position").unwrap();
+    assert!(told.value.unwrap() > 20.0 && told.meaning.contains("`j1`"), "{told:?}");
+    let remedy = given.verdict.cautions.iter().find(|c| c.name == told.name.word()).unwrap();
+    assert!(remedy.remedy.contains("[element.j1]"));
+    let list = "[\"coulomb\", \"viscous\", \"offset\", \"rotor\", \"balancer\"]";
+    std::fs::write(
+        folder.path().join("arm.toml"),
+        format!("{ARM}[element.j1]\nelements = {list}\n{geometry}"),
+    )
+    .unwrap();
+    let stated = estimate(folder.path(), validation);
+    assert!(stated.verdict.checks.iter().all(|c| c.name != told.name));
+    let error = |e: &Estimate| e.validation[0].filtered.relative_error.unwrap();
+    let errors = [&stated, &found, &given].map(error);
+    println!("relative errors on another motion, %: stated, found, given: {errors:.3?}");
+    assert!(errors[0] < 0.5 * errors[1] && errors[1] < 0.7 * errors[2], "{errors:?}");
+}

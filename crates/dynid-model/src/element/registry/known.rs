@@ -98,7 +98,7 @@ fn others() -> Vec<ElementKind> {
 }
 
 fn balancer() -> ElementKind {
-    let kind = of("balancer", &balancer::LINEAR, balancer::place);
+    let kind = of("balancer", &balancer::LINEAR, |p| balancer::place(p.rate, p.shape));
     ElementKind { shape: balancer::SHAPE.to_vec(), turns: true, ..kind }
         .equation("(bf + bk L) ba br sin(q + bphi)/L, L² = ba² + br² - 2 ba br cos(q + bphi)")
         .help("a coil or gas spring that carries a link: [Gravity compensators](#gravity-compensators)")
