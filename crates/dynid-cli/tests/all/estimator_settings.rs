@@ -165,6 +165,18 @@ fn every_kind_of_consistency_is_recorded_and_keeps_its_promise() {
     let chosen = read("pseudo-inertia/estimate.json");
     assert_eq!(chosen["consistency"]["prior"], better["consistency"]["prior"]);
     assert_eq!(column(&chosen["parameters"], "value"), column(&better["parameters"], "value"));
+    // One body for all links is a placeholder, which no distance of bodies is from.
+    let inertials: Vec<&str> =
+        TWO_LINKS.split("<inertial>").skip(1).filter_map(|s| s.split("</inertial>").next()).collect();
+    std::fs::write(folder().join("alike.urdf"), TWO_LINKS.replace(inertials[1], inertials[0])).unwrap();
+    let text = "robot = \"alike.urdf\"\n[[log]]\npath = \"log.csv\"\n";
+    std::fs::write(folder().join("alike.toml"), text).unwrap();
+    let output =
+        support::dynid().current_dir(folder()).args(["identify", "alike.toml", "--out", "alike"]).output();
+    assert!(matches!(output.unwrap().status.code(), Some(0 | 1)));
+    let placeholders = read("alike/estimate.json");
+    let trials = placeholders["consistency"]["prior_trials"].as_array().unwrap();
+    assert!(!trials.is_empty() && trials.iter().all(|t| t["prior"] == "quadratic"), "{trials:?}");
 }
 
 #[test]

@@ -51,8 +51,8 @@ pub(super) fn text(name: Name) -> Text {
             "What the model leaves over of these joints is a function of their position, on parts of the motion that it was not fitted to: a gravity \
              compensator, a spring, a cable, a gear that is not round, or an axis that is not where the robot file has it. Efforts of up to three whole \
              repetitions a turn are taken by themselves; this is what remains.",
-            "State what acts there: a spring beside the joint by its geometry, a torsion spring, or a law of the position.",
-            "[element.j2]\nbeside = [\"balancer\"]\nbalancer = { ba = 0.55, br = 0.12, bphi = 0.35 }",
+            "State what acts there: a spring beside the joint by its geometry (`balancer` in the robot file), a torsion spring (`spring`), or a law of the position.",
+            "[elements]\njoint = { j2 = [\"coulomb\", \"viscous\", \"offset\", \"rotor\", \"slow\"] }\n\n[law.slow]\nfriction = false\ncolumns = { sa = \"cos(2 * q)\", sb = \"sin(2 * q)\" }",
         ),
         Name::Instruments => Text(
             "The estimators `iv`, `didim` and `cloe` simulate the closed loop. The check says whether the simulations settled, whether instruments \

@@ -275,6 +275,15 @@ fn bad_priors_are_repaired_and_missing_ones_invented() {
     assert!((blank.bodies[1].inertia.0[9] - 0.4 * 5.0 * 0.0025).abs() < 1e-15);
 }
 
+/// Files of kinematics often have one body for all links; none of them is a body of the robot.
+#[test]
+fn the_same_numbers_for_all_links_are_no_statement() {
+    let of = |first, second| prior_of(&model_of(&planar([first, second]), Vec::new())).states_bodies();
+    let placeholder = Some(body(1.0, [0.0; 3]));
+    assert!(!of(placeholder, placeholder) && !of(None, placeholder));
+    assert!(of(placeholder, Some(body(2.0, [0.0; 3]))));
+}
+
 #[test]
 fn a_carrier_that_states_zeros_gets_no_invented_body() {
     let found = prior_of(&model_of(
