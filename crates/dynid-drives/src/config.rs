@@ -113,6 +113,9 @@ pub struct DriveConfig {
     pub effort_limit: PerJoint,
     /// What that limits. Default `whole`.
     pub limited: LimitedName,
+    /// Least and largest commanded reading that a drive takes, where it clamps its commands, rad: `{ j1 = [-1.5, 1.5] }`. Default: it takes all.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub command_limits: BTreeMap<String, (f64, f64)>,
     /// Direction of encoder and command against the joint of the robot file, 1 or -1. Default 1.
     #[serde(skip_serializing_if = "PerJoint::is_none")]
     pub direction: PerJoint,
@@ -155,6 +158,7 @@ impl Default for DriveConfig {
             torque_constant: PerJoint::default(),
             effort_limit: PerJoint::default(),
             limited: LimitedName::Whole,
+            command_limits: BTreeMap::new(),
             direction: PerJoint::default(),
             find_directions: false,
             zero: PerJoint::default(),
@@ -402,6 +406,15 @@ impl DriveConfig {
         let direction = s.direction.finite("servo.direction", &names)?;
         let zero = s.zero.finite("servo.zero", &names)?;
         let delay = s.delay.not_negative("servo.delay", &names)?;
+        for (joint, (low, high)) in &s.command_limits {
+            if !names.contains(joint) {
+                return Err(Error::UnknownJoint { name: joint.clone(), known: names.clone() });
+            }
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                let key = format!("servo.command_limits.{joint}");
+                return Err(Error::setting(&key, "two finite numbers that grow", format!("[{low}, {high}]")));
+            }
+        }
         for (j, joint) in out.joints.iter_mut().enumerate() {
             let known = [
                 (Term::PositionGain, gain[j]),
@@ -418,6 +431,9 @@ impl DriveConfig {
             if joint.direction.abs() != 1.0 {
                 let key = format!("servo.direction.{}", names[j]);
                 return Err(Error::setting(&key, "1 or -1", joint.direction));
+            }
+            if let Some(limits) = s.command_limits.get(&names[j]) {
+                joint.command_limits = *limits;
             }
             joint.limited = match s.limited {
                 LimitedName::Whole => Limited::Whole,

@@ -172,6 +172,11 @@ impl ServoResult {
                 true => format!(" forcelimited=\"true\" forcerange=\"{} {limit}\"", -limit),
                 false => String::new(),
             };
+            let (low, high) = j.command_limits;
+            let taken = match low.is_finite() {
+                true => format!(" ctrllimited=\"true\" ctrlrange=\"{low} {high}\""),
+                false => String::new(),
+            };
             let delay = match j.get(Term::Delay) {
                 0.0 => String::new(),
                 d => format!(" <!-- delay {d} s -->"),
@@ -180,7 +185,7 @@ impl ServoResult {
             let _infallible = writeln!(
                 out,
                 "    <general name=\"servo_{name}\" joint=\"{name}\" gaintype=\"fixed\" biastype=\"affine\" gainprm=\"{}\" \
-                 biasprm=\"{constant} {} {}\"{range}/>{delay}",
+                 biasprm=\"{constant} {} {}\"{range}{taken}/>{delay}",
                 kp * j.direction,
                 -kp,
                 -kd
@@ -211,6 +216,7 @@ impl ServoResult {
                     "viscous_friction": j.get(Term::Viscous),
                     "effort_offset": j.get(Term::Offset),
                     "effort_limit": finite(Term::EffortLimit),
+                    "command_limits": j.command_limits.0.is_finite().then_some(j.command_limits),
                     "delay": j.get(Term::Delay),
                     "dead_band": j.get(Term::DeadBand),
                     "rate_limit": finite(Term::RateLimit),

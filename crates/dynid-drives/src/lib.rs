@@ -222,6 +222,7 @@ pub fn identify_servo(
     let settings = config.servo.settings(&robot, period)?;
     refuse_idle(config, &logs)?;
     progress(ServoStep::Fit);
+    warnings.extend(beyond_limits(&robot, &logs, &settings));
     let found = identify(&robot.mechanism, &logs, &settings).map_err(ServoFault::from)?;
     let rms = |values: &ServoValues, logs: &[ServoLog]| -> Option<Vec<Vec<f64>>> {
         let whole = blocks(logs, logs.len());
@@ -247,6 +248,39 @@ pub fn identify_servo(
         .and_then(|values| rms(&values, &logs))
         .map(|by_log| over_logs(&by_log, &logs));
     Ok(ServoResult { robot, logs, validation, settings, found, validation_rms, as_it_came, warnings, inputs })
+}
+
+/// Share of the rows in which a command must lie beyond the limits of its joint, and share of their range by which positions may.
+const BEYOND: f64 = 0.01;
+
+/// Joints whose commands leave the limits of the robot file while their positions do not, in words: drives often clamp what they are told.
+fn beyond_limits(robot: &Robot, logs: &[ServoLog], settings: &ServoSettings) -> Vec<String> {
+    let (names, owners) = (robot.rate_names(), robot.mechanism.rate_bodies());
+    let mut out = Vec::new();
+    for (j, (name, joint)) in names.iter().zip(&settings.joints).enumerate() {
+        let limits = robot.mechanism.bodies()[owners[j]].joint.limits.position;
+        let free = |(low, high): &(f64, f64)| low < high && joint.command_limits.0 == f64::NEG_INFINITY;
+        let Some((low, high)) = limits.filter(free) else { continue };
+        let margin = BEYOND * (high - low);
+        let beyond = |x: &f64| {
+            let q = joint.position(*x);
+            q < low - margin || q > high + margin
+        };
+        let rows: usize = logs.iter().map(ServoLog::rows).sum();
+        let commands = logs.iter().flat_map(|l| &l.command[j]).filter(|u| beyond(u)).count();
+        let stays = !logs.iter().flat_map(|l| &l.position[j]).any(|x| beyond(x));
+        if stays && commands as f64 > BEYOND * rows as f64 {
+            let [a, b] = [low, high].map(|q| joint.reading(q));
+            out.push(format!(
+                "commands of {name} lie beyond the limits of the robot file in {:.0} % of the rows, and its positions never do: if the drive clamps \
+                 its commands, say so: `command_limits = {{ {name} = [{:.4}, {:.4}] }}` in `[servo]`",
+                100.0 * commands as f64 / rows as f64,
+                a.min(b),
+                a.max(b)
+            ));
+        }
+    }
+    out
 }
 
 /// Logs need not all measure efforts or currents that the run states columns for; that none does is a fault. Returns what to say of the others.
@@ -340,8 +374,9 @@ pub fn clamped(
     refuse_loops(&robot, "identified from commands and positions")?;
     refuse_elastic(&robot, "identified from commands and positions")?;
     let of_robot = |joint: &String| robot.rate_names().contains(joint);
-    let own = robot.elements.per_joint.iter().filter(|(_, list)| list.iter().any(|e| e == "spring"));
-    let beside = robot.elements.beside.iter().filter(|(_, e)| e == "spring").map(|(joint, _)| joint);
+    let is_spring = |element: &String| ["spring", "balancer"].contains(&element.as_str());
+    let own = robot.elements.per_joint.iter().filter(|(_, list)| list.iter().any(is_spring));
+    let beside = robot.elements.beside.iter().filter(|(_, e)| is_spring(e)).map(|(joint, _)| joint);
     let sprung: Vec<&str> =
         own.map(|(joint, _)| joint).chain(beside).filter(|j| of_robot(j)).map(String::as_str).collect();
     if !sprung.is_empty() {

@@ -41,7 +41,7 @@ pub enum Hold {
 /// friction = F_v v + (F_c + (F_s - F_c) e^{-(v/v_s)²} + μ |load|) sign(v) + o
 /// ```
 ///
-/// with the encoder's position `x`, direction `s`, the command `u` after delay, rate limit and smoothing, the commanded
+/// with the encoder's position `x`, direction `s`, the command `u` after clamp, delay, rate limit and smoothing, the commanded
 /// velocity `w` and effort `f` (0 if not logged) and the dead band `db`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ServoJoint {
@@ -50,11 +50,18 @@ pub struct ServoJoint {
     pub direction: f64,
     /// What the effort limit acts on.
     pub limited: Limited,
+    /// Least and largest commanded reading that the drive takes: it clamps others. Infinite: it takes all.
+    pub command_limits: (f64, f64),
 }
 
 impl Default for ServoJoint {
     fn default() -> Self {
-        ServoJoint { values: Term::ALL.map(Term::none), direction: 1.0, limited: Limited::Whole }
+        ServoJoint {
+            values: Term::ALL.map(Term::none),
+            direction: 1.0,
+            limited: Limited::Whole,
+            command_limits: (f64::NEG_INFINITY, f64::INFINITY),
+        }
     }
 }
 
@@ -79,6 +86,12 @@ impl ServoJoint {
     /// Position of the joint for a reading of its encoder.
     pub fn position(&self, reading: f64) -> f64 {
         self.direction * reading + self.get(Term::Zero)
+    }
+
+    /// What the drive takes for a commanded reading.
+    pub fn taken(&self, command: f64) -> f64 {
+        let (low, high) = self.command_limits;
+        command.max(low).min(high)
     }
 
     /// Reading of the encoder at a position of the joint.

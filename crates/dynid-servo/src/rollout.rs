@@ -240,7 +240,10 @@ impl<'a> Run<'a> {
         let hold = rollout.scheme.hold;
         let command = |of: &[Vec<f64>], j: usize| of.get(j).map(|c| Command::new(&log.time, c, hold));
         let shaped = |j: &usize| Shaped {
-            position: Command::new(&log.time, &log.command[*j], hold),
+            position: {
+                let taken: Vec<f64> = log.command[*j].iter().map(|u| values.joints[*j].taken(*u)).collect();
+                Command::new(&log.time, &taken, hold)
+            },
             velocity: command(&log.velocity_command, *j),
             effort: command(&log.feed_forward, *j),
             at: [0; 3],

@@ -223,7 +223,8 @@ fn signals(
                     to.extend_from_slice(&from[keep.clone()]);
                 }
                 let joint = &values.joints[*j];
-                let command: Vec<f64> = log.command[*j].iter().map(|u| joint.position(*u)).collect();
+                let command: Vec<f64> =
+                    log.command[*j].iter().map(|u| joint.position(joint.taken(*u))).collect();
                 out[*j].logs.push(LogSignals {
                     command: Command::new(&log.time, &command, scheme.hold),
                     time: time.clone(),

@@ -8,7 +8,7 @@ use dynid_drives::{FoundDrives, ServoFault, set_terms};
 use dynid_identify::Error;
 use dynid_identify::elements::ElementPlan;
 use dynid_model::RobotModel;
-use dynid_servo::{Chain, Rollout, Scheme, ServoLog, ServoValues, Term};
+use dynid_servo::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -61,7 +61,8 @@ pub fn simulate_drives(
         }
     }
     let mut log = ServoLog::new("simulated", time.clone(), command.clone(), command.clone());
-    log.start = Some(command.iter().map(|u| u.first().copied().unwrap_or(0.0)).collect());
+    let first = |(u, joint): (&Vec<f64>, &ServoJoint)| joint.taken(u.first().copied().unwrap_or(0.0));
+    log.start = Some(command.iter().zip(&known.joints).map(first).collect());
     let scheme = Scheme {
         step_s: found.file.simulation.step_s.min(1.0 / settings.rate_hz) / FINER,
         sign_width: 0.0,

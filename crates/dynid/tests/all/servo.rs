@@ -45,6 +45,10 @@ fn truth() -> Vec<ServoJoint> {
 
 /// A log of the arm as text: `t, cmd_*, q_*`.
 fn log(seed: f64, rows: usize) -> String {
+    log_of(truth(), seed, rows)
+}
+
+fn log_of(joints: Vec<ServoJoint>, seed: f64, rows: usize) -> String {
     let locked = vec![("finger".to_owned(), 0.0)];
     let options = RobotOptions { locked, ..RobotOptions::default() };
     let robot = Robot::parse(ARM, Path::new("arm.urdf"), &options).unwrap();
@@ -60,8 +64,8 @@ fn log(seed: f64, rows: usize) -> String {
     let command: Vec<Vec<f64>> = (0..2).map(|j| (0..rows).map(|k| wave(k, j)).collect()).collect();
     let time: Vec<f64> = (0..rows).map(|k| k as f64 * 0.005).collect();
     let mut log = ServoLog::new("log", time, command.clone(), command.clone());
-    log.start = Some(command.iter().map(|c| c[0]).collect());
-    let values = ServoValues { joints: truth(), inertias: robot.mechanism.inertia_vector() };
+    log.start = Some(command.iter().zip(&joints).map(|(c, joint)| joint.taken(c[0])).collect());
+    let values = ServoValues { joints, inertias: robot.mechanism.inertia_vector() };
     let chains = Chain::all(&robot.mechanism);
     let step = std::f64::consts::TAU / 4096.0;
     let mut out = String::from("t,cmd_lift,cmd_elbow,q_lift,q_elbow\n");
@@ -599,5 +603,83 @@ fn designs_for_drives_say_what_they_need() {
     for (text, expected) in cases {
         let found = fault(text);
         assert!(found.contains(expected), "{text}: {found}");
+    }
+}
+
+/// The elbow's drive takes commands from 0.2 to 0.7 rad; the log has what it was told.
+#[test]
+fn a_drive_that_clamps_its_commands_is_told_and_stated() {
+    use dynid::simulate::{SimulateSettings, simulate_drives};
+    let folder = folder();
+    let mut joints = truth();
+    joints[1].command_limits = (0.2, 0.7);
+    std::fs::write(folder.path().join("clamped.csv"), log_of(joints, 0.3, 1600)).unwrap();
+    let arm = ARM.replacen("lower=\"-3\" upper=\"3\"", "LIFT", 1).replacen(
+        "lower=\"-3\" upper=\"3\"",
+        "lower=\"0.15\" upper=\"0.75\"",
+        1,
+    );
+    let arm = arm.replacen("LIFT", "lower=\"-3\" upper=\"3\"", 1);
+    std::fs::write(folder.path().join("narrow.urdf"), arm).unwrap();
+    let text = "robot = \"narrow.urdf\"\n[[log]]\npath = \"clamped.csv\"\n[servo]\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let stated = format!("{text}command_limits = {{ elbow = [0.2, 0.7] }}\n");
+    let [silent, stated] = [text, &stated].map(|text| {
+        let config = config(&folder, text);
+        let found = identify_servo(&config, &mut |_| {}).unwrap();
+        let file = found.file(&config, &[]);
+        (found, file)
+    });
+    let told = silent.0.warnings.join("\n");
+    assert!(
+        told.contains("`command_limits = { elbow = [0.1500, 0.7500] }`") && !told.contains("lift lie"),
+        "{told}"
+    );
+    assert!(!stated.0.warnings.join("\n").contains("command_limits"));
+    for (joint, name) in truth().iter().zip(["lift", "elbow"]) {
+        for term in ["rotor_inertia", "viscous", "coulomb", "offset"] {
+            let p = stated.1.parameters.iter().find(|p| p.term == term && p.joints == [name]).unwrap();
+            let (low, high) = p.interval.unwrap();
+            let true_value = joint.get(Term::named(term).unwrap());
+            assert!(low <= true_value && true_value <= high, "{name} {term}: {low} to {high}, {true_value}");
+        }
+    }
+    let rms = |file: &ServoFile| file.fit.rms[1];
+    let floor = std::f64::consts::TAU / 4096.0 / 12.0_f64.sqrt();
+    assert!(
+        rms(&stated.1) < 1.3 * floor && rms(&silent.1) > 5.0 * floor,
+        "{} {}",
+        rms(&stated.1),
+        rms(&silent.1)
+    );
+
+    // What was stated goes on: into simulations of these drives, and to simulators.
+    let drives = folder.path().join("stated.json");
+    std::fs::write(&drives, stated.1.to_json()).unwrap();
+    let settings = SimulateSettings {
+        drives: Some(drives),
+        rate_hz: 100.0,
+        duration_s: 20.0,
+        ..SimulateSettings::default()
+    };
+    let made =
+        simulate_drives(&folder.path().join("arm.urdf"), &Default::default(), None, &settings).unwrap();
+    let most = |x: &[f64]| x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (told, done) = (most(&made.command.as_ref().unwrap()[1]), most(&made.position[1]));
+    assert!(told > 0.9 && done < 0.75, "{told} {done}");
+    let files = stated.0.files().unwrap();
+    let of = |name: &str| files.files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone()).unwrap();
+    assert!(
+        of("actuators.xml").contains("joint=\"elbow\"")
+            && of("actuators.xml").matches("ctrlrange=\"0.2 0.7\"").count() == 1
+    );
+    let table: serde_json::Value = serde_json::from_str(&of("actuators.json")).unwrap();
+    assert_eq!(table["joints"][1]["command_limits"], serde_json::json!([0.2, 0.7]));
+    assert!(table["joints"][0]["command_limits"].is_null());
+    for (limits, part) in
+        [("{ wrist = [0, 1] }", "wrist"), ("{ elbow = [1, 0] }", "two finite numbers that grow")]
+    {
+        let config = config(&folder, &format!("{text}command_limits = {limits}\n"));
+        let error = identify_servo(&config, &mut |_| {}).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
     }
 }

@@ -441,6 +441,7 @@ half_space = { normal = [1, 0, 0], offset = 0.1 }",
         told("servo.gains", "gains = \"own\""),
         told("servo.velocity_gain", "velocity_gain = 300.0"),
         told("servo.effort_limit", "effort_limit = 15.0"),
+        told("servo.command_limits", "command_limits = { j1 = [-1.0, 1.0] }"),
         told("servo.limited", "limited = \"proportional\""),
         told("servo.direction", "direction = { j2 = -1 }"),
         table(
@@ -708,6 +709,7 @@ fn every_key_of_drives_takes_effect_or_is_refused() {
         servo("servo.gains", "[servo]\ngains = \"own\"", Changes),
         servo("servo.velocity_gain", "[servo]\nvelocity_gain = 0.5", Changes),
         servo("servo.effort_limit", "[servo]\neffort_limit = 6.0", Changes),
+        servo("servo.command_limits", "[servo]\ncommand_limits = { elbow = [0.2, 0.7] }", Changes),
         beside(
             "servo.limited",
             "[servo]\neffort_limit = 6.0",
