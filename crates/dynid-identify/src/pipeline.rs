@@ -602,6 +602,19 @@ pub(crate) fn bench_of(settings: &Settings, robot: &Robot) -> Result<Option<befo
     on.then(|| before::Bench::new(settings, robot)).transpose()
 }
 
+/// The same with the elements of a plan, as a recipe has them.
+///
+/// # Errors
+/// As [`bench_of`].
+pub(crate) fn bench_with(
+    plan: &ElementPlan,
+    settings: &Settings,
+    robot: &Robot,
+) -> Result<Option<before::Bench>, Error> {
+    let on = settings.preflight != Preflight::Off;
+    on.then(|| before::Bench::with(plan, settings, robot)).transpose()
+}
+
 /// [`preflight`] with what logs are examined with.
 pub(crate) fn preflight_on(
     bench: &before::Bench,

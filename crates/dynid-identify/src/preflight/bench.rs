@@ -40,14 +40,18 @@ pub struct Bench {
 impl Bench {
     /// With the elements of the configuration, or the usual ones.
     pub fn new(settings: &Settings, robot: &Robot) -> Result<Bench, Error> {
-        let plan = ElementPlan::of_run(settings, robot, |rate| robot.is_driven(rate))?;
+        Bench::with(&ElementPlan::of_run(settings, robot, |rate| robot.is_driven(rate))?, settings, robot)
+    }
+
+    /// With the elements of a plan.
+    pub fn with(plan: &ElementPlan, settings: &Settings, robot: &Robot) -> Result<Bench, Error> {
         let model = plan.model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let base = BaseParameters::of_model(&model, &shape, &BaseSettings::default());
         Ok(Bench {
             regrouping: advice::regrouping(&base),
             slides: robot.axes.iter().map(|a| a.slides).collect(),
-            stated: stated_values(&model, &plan),
+            stated: stated_values(&model, plan),
             gravity: robot.file.description.gravity,
             stated_delay: settings.conditioning.delay_samples.unwrap_or(0.0),
             robot: robot.path.display().to_string(),

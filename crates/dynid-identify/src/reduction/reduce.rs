@@ -12,7 +12,7 @@ use crate::caution::{self, Caution};
 use crate::fitting::conditioning_fault;
 use crate::log::{self, Log};
 use crate::overlap::Overlaps;
-use crate::pipeline::{bench_of, log_cautions, preflight_on};
+use crate::pipeline::{bench_with, log_cautions, preflight_on};
 use crate::preflight::Bench;
 use crate::problem::Problem;
 use crate::settings::{LogSettings, labels};
@@ -55,7 +55,7 @@ impl Recipe {
     /// [`ReductionError::Contradiction`].
     pub fn reducer(self) -> Result<Reducer, Error> {
         let (problem, _) = self.problem()?;
-        let bench = bench_of(&problem.settings, &problem.robot)?;
+        let bench = bench_with(&problem.plan, &problem.settings, &problem.robot)?;
         Ok(Reducer { hash: self.hash(), problem, bench, recipe: self, windows: WindowSettings::default() })
     }
 }

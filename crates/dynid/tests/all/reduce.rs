@@ -280,6 +280,34 @@ fn doubts_of_a_recipe_are_doubts_of_what_is_solved_by_it() {
     assert!(check.status.word() != "ok" && check.meaning.contains(doubts[0].name.word()), "{check:?}");
 }
 
+/// A spring that carries most of a link, which the robot file states: without it bodies explain the log better under another clock.
+#[test]
+fn the_pre_flight_of_a_recipe_knows_the_elements_of_the_robot_file() {
+    use dynid::simulate::{SimulateSettings, simulate};
+    let folder = tempfile::tempdir().unwrap();
+    let geometry = "ba = 0.4, br = 0.25, bphi = 0.4";
+    let robot = |values: &str| {
+        format!(
+            "{}[element.j1]\nbeside = [\"balancer\"]\nbalancer = {{ {geometry}{values} }}\n",
+            crate::support::ARM
+        )
+    };
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("truth.toml"), robot(", stiffness = 3000, force = -400")).unwrap();
+    std::fs::write(path("arm.toml"), robot("")).unwrap();
+    let truth = dynid::Robot::load(&path("truth.toml"), &dynid::RobotOptions::default()).unwrap();
+    let settings =
+        SimulateSettings::parse("duration_s = 10.0\nrate_hz = 500\nseed = 3", "simulation").unwrap();
+    crate::support::write_log(&simulate(&truth, &settings).unwrap(), &path("log.csv"));
+    let log = LogConfig { path: path("log.csv"), ..LogConfig::default() };
+    let config = Config { robot: path("arm.toml"), log: vec![log.clone()], ..Config::default() };
+    let learned = learn(&config, false, &mut |_| {}).unwrap();
+    let recipe = learned.reduction.recipe().clone();
+    let reduced = reduce(recipe, &[log], &MappingSpec::default(), None, &mut |_| {}).unwrap();
+    let solved = reduced.solve([], &mut |_| {}).unwrap().estimate();
+    assert!(apart(&learned.estimate, &solved).0 < 1e-9);
+}
+
 #[test]
 fn factors_of_another_recipe_do_not_mix() {
     let [first, ..] = parts();
