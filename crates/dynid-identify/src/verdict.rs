@@ -360,7 +360,8 @@ fn position(id: &Identification) -> Option<CheckResult> {
         "%",
         "below 20 % of the mean square residual on held-out parts of the motion, or within three standard errors",
         format!(
-            "the residual of {} is a function of the joint's position: a gravity compensator, a spring, a cable, a gear that is not round, or an axis              that is not where the robot file has it; standard deviations do not cover it",
+            "the residual of {} is a function of the joint's position: a gravity compensator, a spring, a cable, a gear that is not round, or an axis \
+             that is not where the robot file has it; standard deviations do not cover it",
             named.join(", ")
         ),
     ))
