@@ -268,7 +268,7 @@ fn beyond_limits(robot: &Robot, logs: &[ServoLog], settings: &ServoSettings) -> 
         };
         let rows: usize = logs.iter().map(ServoLog::rows).sum();
         let commands = logs.iter().flat_map(|l| &l.command[j]).filter(|u| beyond(u)).count();
-        let stays = !logs.iter().flat_map(|l| &l.position[j]).any(|x| beyond(x));
+        let stays = !logs.iter().flat_map(|l| &l.position[j]).any(beyond);
         if stays && commands as f64 > BEYOND * rows as f64 {
             let [a, b] = [low, high].map(|q| joint.reading(q));
             out.push(format!(

@@ -63,6 +63,7 @@ impl Default for CyclicSettings {
 
 /// Slower rows, in parts of the rms speed, count as rest.
 const REST: f64 = 0.05;
+
 /// A row of residuals of a joint that moves.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {

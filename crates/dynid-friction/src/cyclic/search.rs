@@ -37,8 +37,8 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The cyclic efforts that residuals of a joint show: at most one torque and one friction, the one that gains more first.
 ///
-/// The order `n` is a small whole number or is looked for between `least_periods` over the range of the joint and the largest whose ripple passes the kernel in a fifth of
-/// the rows. At a row the kernel leaves `exp(-½ (n v σ)²)` of a ripple, `v` its speed, `σ` the kernel's standard deviation. Peaks of the spectrum
+/// The order `n` is a small whole number, where any slow function of the position takes a share of the residual too, or is looked for between
+/// `least_periods` over the range of the joint and the largest whose ripple passes the kernel in a fifth of the rows. At a row the kernel leaves `exp(-½ (n v σ)²)` of a ripple, `v` its speed, `σ` the kernel's standard deviation. Peaks of the spectrum
 /// over position are fitted without one part of the motion each and judged there; what passes is taken off before more is looked for.
 ///
 /// # Panics
@@ -52,6 +52,15 @@ pub fn find_cyclic(rows: &CyclicRows, settings: &CyclicSettings) -> Vec<CyclicFi
         out.push(found);
     }
     out
+}
+
+/// An order that passes.
+struct Passed {
+    is_friction: bool,
+    cycles: f64,
+    gain: Gain,
+    coefficients: [f64; 2],
+    is_slow: bool,
 }
 
 struct Search<'a> {
@@ -93,21 +102,23 @@ impl<'a> Search<'a> {
             false => Vec::new(),
         };
         let resolution = PI / (2.0 * (self.range.1 - self.range.0));
-        let mut best: Option<(bool, f64, Gain, [f64; 2])> = None;
-        let judged = |n: f64, is_friction: bool| score(&self.rows, self.parts, n, is_friction, self.kernel_s);
-        let better = |gain: &Gain, best: &Option<(bool, f64, Gain, [f64; 2])>| {
-            best.as_ref().is_none_or(|(_, _, other, _)| gain.share > other.share)
+        let mut best: Option<Passed> = None;
+        let mut offer = |passed: Passed| {
+            if best.as_ref().is_none_or(|other| passed.gain.share > other.gain.share) {
+                best = Some(passed);
+            }
         };
-        for is_friction in kinds {
+        for is_friction in kinds.iter().copied() {
+            let judged = |n: f64| score(&self.rows, self.parts, n, is_friction, self.kernel_s);
             // One order alone may be a chance of the places that a motion passes: the residual is to be a function of the position as a whole.
-            let slow = slow_gain(&self.rows, self.parts, *is_friction, self.settings).map(|_| &self.slow);
-            for cycles in slow.into_iter().flatten() {
-                let Some(found) = judged(*cycles, *is_friction) else { continue };
-                if is_slow(&found.of_parts, self.settings) && better(&found.of_parts, &best) {
-                    best = Some((*is_friction, *cycles, found.of_parts, found.coefficients));
+            let slow = slow_gain(&self.rows, self.parts, is_friction, self.settings).map(|_| &self.slow);
+            for cycles in slow.into_iter().flatten().copied() {
+                let Some(Score { of_parts: gain, coefficients, .. }) = judged(cycles) else { continue };
+                if is_slow(&gain, self.settings) {
+                    offer(Passed { is_friction, cycles, gain, coefficients, is_slow: true });
                 }
             }
-            let share = |k: usize| lines[k].shares[usize::from(*is_friction)];
+            let share = |k: usize| lines[k].shares[usize::from(is_friction)];
             let worth = NEAR * self.settings.least_gain;
             let is_peak = |k: &usize| {
                 let above =
@@ -117,24 +128,21 @@ impl<'a> Search<'a> {
             let mut peaks: Vec<usize> = (0..lines.len()).filter(is_peak).collect();
             peaks.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
             for k in peaks.into_iter().take(TRIED) {
-                if judged(lines[k].order, *is_friction).and_then(|found| self.passes(&found, NEAR)).is_none()
-                {
+                if judged(lines[k].order).and_then(|found| self.passes(&found, NEAR)).is_none() {
                     continue;
                 }
-                let cycles = self.refined(lines[k].order, *is_friction, resolution);
-                let Some(found) = judged(cycles, *is_friction) else { continue };
+                let cycles = self.refined(lines[k].order, is_friction, resolution);
+                let Some(found) = judged(cycles) else { continue };
                 let Some(gain) = self.passes(&found, 1.0) else { continue };
-                if better(&gain, &best) {
-                    best = Some((*is_friction, cycles, gain, found.coefficients));
-                }
+                offer(Passed { is_friction, cycles, gain, coefficients: found.coefficients, is_slow: false });
             }
         }
-        let (is_friction, cycles, gain, coefficients) = best?;
+        let Passed { is_friction, cycles, gain, coefficients, is_slow } = best?;
         without_order(&mut self.rows, cycles, is_friction, coefficients, self.kernel_s);
         let [a, b] = coefficients;
         let amplitude = a.hypot(b);
         let (gain, standard_error) = (gain.share, gain.error);
-        let resolution = if self.slow.contains(&cycles) { 0.0 } else { resolution };
+        let resolution = if is_slow { 0.0 } else { resolution };
         Some(CyclicFinding { is_friction, cycles, resolution, amplitude, gain, standard_error })
     }
 
