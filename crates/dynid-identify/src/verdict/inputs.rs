@@ -16,7 +16,7 @@ const FAR_OFF: f64 = 0.1;
 
 /// Checks of the logs.
 pub(super) fn checks(id: &Identification) -> Vec<CheckResult> {
-    [Some(preflight(id)), recipe(id), repeated(id), seen_before(id), Some(scale(&id.effort_scale))]
+    [Some(preflight(id)), recipe(id), repeated(id), seen_before(id), Some(scale(id))]
         .into_iter()
         .flatten()
         .collect()
@@ -100,7 +100,26 @@ fn seen_before(id: &Identification) -> Option<CheckResult> {
     ))
 }
 
-fn scale(found: &EffortScale) -> CheckResult {
+/// Joints with an effort of their position that the robot file does not hold: a spring that carries a link passes for mass of it.
+fn carried(id: &Identification) -> String {
+    let slow =
+        id.cyclic.iter().filter(|c| c.found.resolution == 0.0 && !c.found.is_friction).map(|c| c.output);
+    let mut outputs: Vec<usize> = slow.chain(id.slow.iter().map(|s| s.output)).collect();
+    outputs.sort_unstable();
+    outputs.dedup();
+    let names = dynid_model::EffortModel::outputs(&id.model);
+    let names: Vec<&str> = outputs.iter().map(|o| names[*o].name.as_str()).collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!(
+            "; or a spring acts at `{}`, whose effort follows its position: what it carries counts among the masses",
+            names.join("`, `")
+        ),
+    }
+}
+
+fn scale(id: &Identification) -> CheckResult {
+    let found = &id.effort_scale;
     let name = CheckName::EffortScale;
     let assumption = found.assumption().unwrap_or_default();
     match found.source {
@@ -120,8 +139,9 @@ fn scale(found: &EffortScale) -> CheckResult {
                 ),
                 false => format!(
                     "efforts are {ratio:.2} times those of the bodies in the robot file: either its masses are wrong or the unit or the torque \
-                     constants of the efforts are, and then all masses, inertias and friction by the same factor; {assumption}; if the efforts are \
-                     right, say so: `known_effort_scale = true`"
+                     constants of the efforts are, and then all masses, inertias and friction by the same factor{}; {assumption}; if the efforts are \
+                     right, say so: `known_effort_scale = true`",
+                    carried(id)
                 ),
             };
             let limit = format!("within a factor of {FILE_AGREES} of the robot file's masses");

@@ -133,7 +133,7 @@ fn an_unknown_gravity_compensator_is_taken_for_a_slow_effort_of_the_joint() {
     let truth = plain
         .replace("\"cyclic\"", "\"balancer\"")
         .replace("[element.j2]", &format!("{geometry}[element.j2]"));
-    let values = [("j1.bk", 100.0), ("j1.bf", 20.0)];
+    let values = [("j1.bk", 300.0), ("j1.bf", 60.0)];
     bench(folder.path(), &truth, &values);
     log(folder.path(), "other.csv", 8, &truth, &values);
     let validation = "[[validation]]\npath = \"other.csv\"";
@@ -150,6 +150,11 @@ fn an_unknown_gravity_compensator_is_taken_for_a_slow_effort_of_the_joint() {
     assert!(told.value.unwrap() > 20.0 && told.meaning.contains("`j1`"), "{told:?}");
     let remedy = given.verdict.cautions.iter().find(|c| c.name == told.name.word()).unwrap();
     assert!(remedy.remedy.contains("[element.j1]"));
+    // What the spring carries makes efforts of masses that the file does not have.
+    for estimate in [&found, &given] {
+        let scale = estimate.verdict.checks.iter().find(|c| c.name.word() == "scale of the efforts").unwrap();
+        assert!(scale.meaning.contains("or a spring acts at `j1`"), "{scale:?}");
+    }
     let list = "[\"coulomb\", \"viscous\", \"offset\", \"rotor\", \"balancer\"]";
     std::fs::write(
         folder.path().join("arm.toml"),
