@@ -503,7 +503,9 @@ impl Identification {
         }
         let efforts = cyclic::records(self);
         for of_joint in efforts.chunk_by(|a, b| a.joint == b.joint) {
-            let (names, reason) = cyclic::in_words(of_joint);
+            let own = |c: &&crate::JointCyclic| self.model.outputs()[c.output].name == of_joint[0].joint;
+            let may_be_a_spring = self.cyclic.iter().filter(own).any(|c| c.found.may_be_a_spring());
+            let (names, reason) = cyclic::in_words(of_joint, may_be_a_spring);
             let name = format!("cyclic efforts of {}", of_joint[0].joint);
             add(&name, json!(names), "", Origin::Found, reason);
         }

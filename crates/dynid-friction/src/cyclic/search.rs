@@ -24,6 +24,13 @@ pub struct CyclicFinding {
     pub standard_error: f64,
 }
 
+impl CyclicFinding {
+    /// Whether it is a torque of a slow order: what a spring or a gravity compensator leaves in a residual looks like that.
+    pub fn may_be_a_spring(&self) -> bool {
+        self.resolution == 0.0 && !self.is_friction
+    }
+}
+
 /// Share of the rows that is slow enough for the largest order to pass the kernel.
 const SLOWEST: f64 = 0.2;
 /// Peaks of a spectrum that are judged.

@@ -25,8 +25,9 @@ pub(super) fn records(id: &Identification) -> Vec<CyclicEffort> {
     id.cyclic.iter().map(of).collect()
 }
 
-/// Names of what a joint took, and why.
-pub(super) fn in_words(efforts: &[CyclicEffort]) -> (Vec<String>, String) {
+/// Names of what a joint took, and why; `may_be_a_spring`: [`CyclicFinding::may_be_a_spring`](dynid_friction::cyclic::CyclicFinding::may_be_a_spring)
+/// of one of them.
+pub(super) fn in_words(efforts: &[CyclicEffort], may_be_a_spring: bool) -> (Vec<String>, String) {
     let order = |e: &CyclicEffort| match e.unit.as_str() {
         "N" => format!("every {:.4} mm", 1e3 * TAU / e.cycles),
         _ => format!("{:.2} a turn", e.cycles),
@@ -42,12 +43,11 @@ pub(super) fn in_words(efforts: &[CyclicEffort]) -> (Vec<String>, String) {
         )
     };
     let gains: Vec<String> = efforts.iter().map(gain).collect();
-    // A whole number of few repetitions is what a search between more of them never gives.
-    let is_slow = |e: &&CyclicEffort| {
-        e.element == cyclic_element(false).0 && e.cycles <= 3.0 && e.cycles.fract() == 0.0
+    let slow = match may_be_a_spring {
+        true => {
+            "; where a spring acts beside the joint, state it: `beside = [\"balancer\"]` or `beside = [\"spring\"]` in the robot file"
+        }
+        false => "",
     };
-    let slow = efforts.iter().find(is_slow).map_or("", |_| {
-        "; where a spring acts beside the joint, state it: `beside = [\"balancer\"]` or `beside = [\"spring\"]` in the robot file"
-    });
     (names, format!("mean square residual on held-out parts of the motion falls: {}{slow}", gains.join(", ")))
 }

@@ -102,8 +102,7 @@ fn seen_before(id: &Identification) -> Option<CheckResult> {
 
 /// Joints with an effort of their position that the robot file does not hold: a spring that carries a link passes for mass of it.
 fn carried(id: &Identification) -> String {
-    let slow =
-        id.cyclic.iter().filter(|c| c.found.resolution == 0.0 && !c.found.is_friction).map(|c| c.output);
+    let slow = id.cyclic.iter().filter(|c| c.found.may_be_a_spring()).map(|c| c.output);
     let mut outputs: Vec<usize> = slow.chain(id.slow.iter().map(|s| s.output)).collect();
     outputs.sort_unstable();
     outputs.dedup();
