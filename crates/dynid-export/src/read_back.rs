@@ -2,7 +2,7 @@
 
 use dynid_identify::Error;
 use dynid_model::closed::ClosedMechanism;
-use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Spring, Viscous, sign};
+use dynid_model::element::{Coulomb, JointElement, LuGre, MaxwellSlip, RotorInertia, Spring, Viscous, sign};
 use dynid_model::{
     ClosedModel, Description, EffortModel, Mechanism, MotionBlock, RandomMotion, RegressorBlock, RobotModel,
     TreeModel,
@@ -209,8 +209,8 @@ pub fn with_slipping_bristles(
         .iter()
         .enumerate()
         .flat_map(|(rate, joint)| {
-            let bent = format!("{}.{}", joint.name, LuGre::BRISTLE);
-            let signal = model.signals().iter().find(|name| **name == bent)?;
+            let springs = [LuGre::BRISTLE, MaxwellSlip::SPRING].map(|name| format!("{}.{name}", joint.name));
+            let signal = model.signals().iter().find(|name| springs.contains(name))?;
             Some((signal.as_str(), motion.rate(rate).iter().map(|v| sign(*v)).collect()))
         })
         .collect();

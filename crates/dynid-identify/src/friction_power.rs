@@ -1,6 +1,7 @@
 //! Friction that takes energy out of the motion, as rows of the consistent estimate.
 
 use dynid_estimate::consistent::Bound;
+use dynid_model::element::MaxwellSlip;
 use dynid_model::{EffortModel, MotionBlock, Output, RobotModel};
 use dynid_rows::conditioning::{ConditioningSettings, JointFriction, Moving, PreparedLog, ShapeKind, States};
 
@@ -88,7 +89,9 @@ pub(crate) fn limits(
         }
         // What never shows in steady motion keeps its own limit.
         let shows = |k: usize| rows.iter().any(|row| row[k] != 0.0);
-        let kept = joint.columns.iter().enumerate().filter(|(k, _)| shows(*k));
+        let spring = format!("{}.{}", output.name, MaxwellSlip::FRICTION.symbol);
+        let kept = joint.columns.iter().enumerate();
+        let kept = kept.filter(|(k, column)| shows(*k) && table[**column].name != spring);
         out.kept.extend(kept.map(|(_, column)| table[*column].name.clone()));
     }
     Ok(out)
@@ -137,8 +140,19 @@ impl Rows {
         rest[rate * n..][..n].fill(0.0);
         let channels: Vec<(&str, Vec<f64>)> =
             log.channels.iter().map(|c| (c.name.as_str(), pick(&c.values))).collect();
-        let channels: Vec<(&str, &[f64])> = channels.iter().map(|(name, x)| (*name, x.as_slice())).collect();
         let shape = model.parameters().shape_start();
+        // A spring gives back what it took: where it drives, the friction beside it has to oppose the motion by itself.
+        let spring = format!("{}.{}", model.outputs()[rate].name, MaxwellSlip::SPRING);
+        let remembered = states.remembered(model, &shape, &log.channels);
+        let opposing = |values: &[f64]| -> Vec<f64> {
+            let velocity = &dq[rate * n..][..n];
+            let against = |(w, v): (f64, &f64)| if w * v > 0.0 { w } else { 0.0 };
+            pick(values).into_iter().zip(velocity).map(against).collect()
+        };
+        let spring =
+            remembered.iter().find(|c| c.name == spring).map(|c| (c.name.as_str(), opposing(&c.values)));
+        let channels: Vec<(&str, &[f64])> =
+            channels.iter().chain(&spring).map(|(name, x)| (*name, x.as_slice())).collect();
         let columns = |dq: &[f64]| {
             let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(n, &q, dq, &ddq) };
             model.friction_columns(rate, &shape, &motion)

@@ -34,6 +34,8 @@ pub struct ShapeFit {
 pub(crate) enum Start {
     /// Where the elements say.
     Stated,
+    /// So, and from nowhere else: all values are the best of grids on held-out blocks.
+    Chosen,
     /// From values.
     From(Vec<f64>),
     /// From values, and from nowhere else, without a look at what the logs say about each.
@@ -47,7 +49,7 @@ pub(crate) enum Start {
 pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> Result<ShapeFit, Error> {
     let Problem { model, structure, logs, settings, .. } = problem;
     let shape = match start {
-        Start::Stated => model.parameters().shape_start(),
+        Start::Stated | Start::Chosen => model.parameters().shape_start(),
         Start::From(values) | Start::Near(values) | Start::Beside(values, _) => values.clone(),
     };
     let defaults = SeparableSettings::default();
@@ -58,6 +60,12 @@ pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> 
             let step_tolerance = ROUGH_STEP;
             SeparableSettings { seed, starts: 1, profile_points: 0, step_tolerance, ..defaults }
         }
+        Start::Chosen => SeparableSettings {
+            seed,
+            search: settings.estimator.shape.search(seed)?,
+            starts: settings.estimator.shape.starts.unwrap_or(1),
+            ..defaults
+        },
         Start::Stated | Start::From(_) => SeparableSettings {
             seed,
             search: settings.estimator.shape.search(seed)?,

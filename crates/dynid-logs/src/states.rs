@@ -36,6 +36,8 @@ pub struct States {
     pub gravity: Option<[Vec<f64>; 3]>,
     /// Channels that were asked for, by name: `temperature_<joint>` in °C.
     pub channels: Vec<(String, Vec<f64>)>,
+    /// Time, s, where the table has a column `t` or `time` that ascends: its states follow one another.
+    pub time: Option<Vec<f64>>,
 }
 
 /// Why a table of states was refused.
@@ -187,7 +189,15 @@ pub fn from_table(table: &Table, joints: &[StateJoint]) -> Result<States, States
         acceleration,
         gravity: gravity(table)?,
         channels: Vec::new(),
+        time: time(table),
     })
+}
+
+/// The column of time, if it ascends from state to state.
+fn time(table: &Table) -> Option<Vec<f64>> {
+    let values = table.column("t").or_else(|| table.column("time"))?;
+    let ascends = values.windows(2).all(|pair| pair[0] < pair[1]);
+    ascends.then(|| values.to_vec())
 }
 
 /// Names of coordinates without the prefix: `_<joint>` or `_<joint>.x`.

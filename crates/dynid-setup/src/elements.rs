@@ -185,6 +185,20 @@ impl ElementPlan {
         ElementPlan { closed, ..self }
     }
 
+    /// Returns the plan for motion whose past is not looked at: without friction that gives way where a joint has friction with the sign of its
+    /// velocity, which it is the same as there.
+    #[must_use]
+    pub fn in_steady_motion(mut self) -> Self {
+        let kind = ShapeKind::MaxwellSlip;
+        let beside = candidate(&self.spec.registry, kind).map_or(&[][..], |c| c.beside);
+        for list in &mut self.per_rate {
+            if list.iter().any(|name| beside.contains(&name.as_str())) {
+                list.retain(|name| name != kind.element());
+            }
+        }
+        self
+    }
+
     /// The plan of the robot alone: nothing that belongs to single logs.
     pub fn without_logs(&self) -> Self {
         ElementPlan { log_terms: LogTerms::default(), ..self.clone() }
@@ -242,7 +256,7 @@ impl ElementPlan {
             .collect()
     }
 
-    /// Adds a friction shape to a joint, its speed the start of a search within a factor of 3. Its element may take the place of
+    /// Adds a friction shape to a joint, its value the start of a search within a factor of 3. Its element may take the place of
     /// another ([`Candidate::instead_of`]).
     pub fn add_shape(&mut self, rate: usize, joint: &str, shape: &FrictionShape) {
         let (name, key) = shape_element(shape.kind);
@@ -357,7 +371,7 @@ impl ElementPlan {
             }
             true => Some("where no joint has friction"),
             false => (friction.iter().any(|e| !e.signals(&joints).is_empty()))
-                .then_some("beside `lugre`: friction with memory has no form for it"),
+                .then_some("beside `lugre` or `maxwell_slip`: friction with memory has no form for it"),
         };
         match refused {
             Some(why) => Err(Error::Unsupported(format!("`own = [\"friction_scale\"]` {why}"))),
@@ -422,10 +436,10 @@ fn candidate(registry: &ElementRegistry, kind: ShapeKind) -> Option<&Candidate> 
     registry.kind(kind.element())?.candidate.as_ref()
 }
 
-/// Element of a friction shape, and the shape parameter that its speed is.
+/// Element of a friction shape, and the shape parameter that its value is.
 pub fn shape_element(kind: ShapeKind) -> (&'static str, Option<&'static str>) {
     let registry = ElementRegistry::default();
-    (kind.element(), candidate(&registry, kind).and_then(|candidate| candidate.speed))
+    (kind.element(), candidate(&registry, kind).and_then(|candidate| candidate.value))
 }
 
 /// Element of a cyclic friction or torque, and the shape parameter that is its order.

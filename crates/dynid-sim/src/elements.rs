@@ -71,22 +71,27 @@ impl Elements<'_> {
         !self.model.signals().is_empty()
     }
 
-    /// Values of the model's signals at velocities `dq`, a time `step` (s) after what `history` remembers, with velocities
+    /// Values of the model's signals at positions and velocities, a time `step` (s) after what `history` remembers, with velocities
     /// `between` on the way; at that instant itself without a step.
-    pub(crate) fn signals(&self, history: &History, step: Option<(f64, &[f64])>, dq: &[f64]) -> Vec<f64> {
+    pub(crate) fn signals(
+        &self,
+        history: &History,
+        step: Option<(f64, &[f64])>,
+        (q, dq): (&[f64], &[f64]),
+    ) -> Vec<f64> {
         match step {
-            None => self.form(&mut history.clone(), &[dq], 1.0),
+            None => self.form(&mut history.clone(), q, &[dq], 1.0),
             Some((step, between)) => {
-                let both = self.form(&mut history.clone(), &[between, dq], step);
+                let both = self.form(&mut history.clone(), q, &[between, dq], step);
                 both.into_iter().skip(1).step_by(2).collect()
             }
         }
     }
 
-    /// Takes what elements remember on by `step` seconds at velocities `dq`.
-    pub(crate) fn pass(&self, history: &mut History, step: f64, dq: &[f64]) {
+    /// Takes what elements remember on by `step` seconds at velocities `dq` to positions `q`.
+    pub(crate) fn pass(&self, history: &mut History, step: f64, (q, dq): (&[f64], &[f64])) {
         if self.remember() {
-            self.form(history, &[dq], step);
+            self.form(history, q, &[dq], step);
         }
     }
 
@@ -96,22 +101,23 @@ impl Elements<'_> {
         channels: &[f64],
         history: &History,
         step: Option<(f64, &[f64])>,
-        dq: &[f64],
+        state: (&[f64], &[f64]),
     ) -> Vec<f64> {
         let mut all = channels.to_vec();
         if self.remember() {
-            all.extend(self.signals(history, step, dq));
+            all.extend(self.signals(history, step, state));
         }
         all
     }
 
-    /// Signals of some instants, signal after signal.
-    fn form(&self, history: &mut History, velocities: &[&[f64]], step: f64) -> Vec<f64> {
+    /// Signals of some instants at the same positions, signal after signal.
+    fn form(&self, history: &mut History, q: &[f64], velocities: &[&[f64]], step: f64) -> Vec<f64> {
         let ((positions, rates), samples) = (self.model.dimensions(), velocities.len());
+        let q: Vec<f64> = (0..positions).flat_map(|j| std::iter::repeat_n(q[j], samples)).collect();
         let dq: Vec<f64> = (0..rates).flat_map(|j| velocities.iter().map(move |v| v[j])).collect();
-        let rest = vec![0.0; positions * samples];
+        let rest = vec![0.0; rates * samples];
         let mut out = vec![0.0; self.model.signals().len() * samples];
-        let motion = MotionBlock::plain(samples, &rest, &dq, &rest[..rates * samples]);
+        let motion = MotionBlock::plain(samples, &q, &dq, &rest);
         self.model.remember(&motion, step, self.shape, history, samples, &mut out);
         out
     }

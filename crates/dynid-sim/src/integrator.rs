@@ -115,12 +115,13 @@ impl<'a> Integrator<'a> {
     ) -> Result<(), SimError> {
         if state.history == History::default() {
             // A record starts at the steady state of its own velocity, not at that of a step's mean.
-            self.plant.elements().pass(&mut state.history, duration, &state.dq);
+            self.plant.elements().pass(&mut state.history, duration, (&state.q, &state.dq));
         }
         let mut interval = self.control.interval(time, duration);
         while let Some(mut h) = self.control.next(&interval) {
             let mass = self.plant.mass_matrix(&state.q, &mut self.work);
-            let now = self.plant.elements().with_signals(channels, &state.history, None, &state.dq);
+            let now =
+                self.plant.elements().with_signals(channels, &state.history, None, (&state.q, &state.dq));
             self.plant.stiffness_and_damping(
                 (&state.q, &state.dq),
                 &now,
@@ -165,15 +166,15 @@ impl<'a> Integrator<'a> {
             let step = h * alpha.iter().sum::<f64>();
             let between = mean(&from.dq, &self.at.dq);
             let step = (step > 0.0).then_some((step, between.as_slice()));
-            let channels = self.plant.elements().with_signals(channels, &from.history, step, &self.at.dq);
             let state = (&self.at.q[..], &self.at.dq[..]);
+            let channels = self.plant.elements().with_signals(channels, &from.history, step, state);
             self.plant.acceleration(state, drive, &channels, &mut self.work, &mut self.acceleration)?;
             self.evaluations += 1;
             self.solve_stage(i, mass, h);
         }
         let error = self.finish(from);
         let between = mean(&from.dq, &self.next.dq);
-        self.plant.elements().pass(&mut self.next.history, h, &between);
+        self.plant.elements().pass(&mut self.next.history, h, (&self.next.q, &between));
         Ok(error)
     }
 

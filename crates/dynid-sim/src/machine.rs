@@ -61,7 +61,7 @@ impl Motion for PlantMotion<'_> {
     fn instant(&mut self, drive: &[f64], channels: &[f64], time: f64) -> Result<Instant, SimError> {
         let PlantState { q, dq, history, .. } = &self.state;
         let mut ddq = vec![0.0; q.len()];
-        let all = self.plant.elements().with_signals(channels, history, None, dq);
+        let all = self.plant.elements().with_signals(channels, history, None, (q, dq));
         self.plant
             .acceleration((q, dq), drive, &all, self.integrator.workspace(), &mut ddq)
             .map_err(|source| SimError::Inertia { time, source })?;

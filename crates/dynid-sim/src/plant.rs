@@ -196,10 +196,15 @@ impl Plant {
         }
     }
 
-    /// Values of the model's signals at velocities `dq`, a time `step` (s) after what `history` remembers, with velocities
+    /// Values of the model's signals at positions and velocities, a time `step` (s) after what `history` remembers, with velocities
     /// `between` on the way; at that instant itself without a step.
-    pub fn signals(&self, history: &History, step: Option<(f64, &[f64])>, dq: &[f64]) -> Vec<f64> {
-        self.elements().signals(history, step, dq)
+    pub fn signals(
+        &self,
+        history: &History,
+        step: Option<(f64, &[f64])>,
+        state: (&[f64], &[f64]),
+    ) -> Vec<f64> {
+        self.elements().signals(history, step, state)
     }
 
     fn inertias(&self) -> &[f64] {

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use dynid_logs::{LogHeader, MappingSpec, ReadOptions, States, StatesError, Table, states};
 use dynid_model::element::temperature_channel;
-use dynid_model::{BaseParameters, EffortModel, JournalModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{
+    BaseParameters, EffortModel, History, JournalModel, MotionBlock, RegressorBlock, RobotModel,
+};
 
 use crate::Error;
 use crate::estimate::ReadingRecord;
@@ -82,6 +84,9 @@ fn with_recorded_columns(
     Ok(table)
 }
 
+/// Difference of steps of time, as a share, that counts as rounding.
+const SAME_STEP: f64 = 1e-6;
+
 /// Channel-after-channel copy of a states table.
 struct Flat {
     rows: usize,
@@ -90,6 +95,7 @@ struct Flat {
     ddq: Vec<f64>,
     gravity: Option<Vec<f64>>,
     channels: Vec<(String, Vec<f64>)>,
+    time: Option<Vec<f64>>,
 }
 
 impl Flat {
@@ -101,7 +107,38 @@ impl Flat {
             ddq: states.acceleration.concat(),
             gravity: states.gravity.as_ref().map(|g| g.concat()),
             channels: states.channels.clone(),
+            time: states.time.clone(),
         }
+    }
+
+    /// Signals that depend on the motion before, signal after signal; empty where the states have no time.
+    ///
+    /// States that are equally far apart go through the model together.
+    fn remembered(&self, model: &RobotModel) -> Vec<f64> {
+        let Some(time) = self.time.as_ref().filter(|_| !model.signals().is_empty() && self.rows > 1) else {
+            return Vec::new();
+        };
+        let channels: Vec<(&str, &[f64])> =
+            self.channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+        let step = |k: usize| time[(k + 1).min(self.rows - 1)] - time[k.min(self.rows - 2)];
+        let mut values = vec![0.0; model.signals().len() * self.rows];
+        let (mut history, mut start) = (History::default(), 0);
+        while start < self.rows {
+            let held = step(start);
+            let alike = |k: &usize| (step(*k) - held).abs() <= SAME_STEP * held;
+            let end = start + (start..self.rows).take_while(alike).count().max(1);
+            let channels: Vec<(&str, &[f64])> =
+                channels.iter().map(|(name, values)| (*name, &values[start..end])).collect();
+            let motion = MotionBlock {
+                stride: self.rows,
+                channels: &channels,
+                ..MotionBlock::plain(end - start, &self.q[start..], &self.dq[start..], &self.ddq[start..])
+            };
+            let shape = model.parameters().shape_start();
+            model.remember(&motion, held, &shape, &mut history, self.rows, &mut values[start..]);
+            start = end;
+        }
+        values
     }
 
     fn regressor(&self, model: &RobotModel) -> Result<RegressorBlock, Error> {
@@ -110,8 +147,13 @@ impl Flat {
                 return Err(Error::StatesChannel { channel: channel.clone() });
             }
         }
-        let channels: Vec<(&str, &[f64])> =
-            self.channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+        let remembered = self.remembered(model);
+        let channels: Vec<(&str, &[f64])> = self
+            .channels
+            .iter()
+            .map(|(name, values)| (name.as_str(), values.as_slice()))
+            .chain(model.signals().iter().map(String::as_str).zip(remembered.chunks_exact(self.rows.max(1))))
+            .collect();
         let mut block = RegressorBlock::new(model.layout().clone(), self.rows);
         let motion = MotionBlock {
             samples: self.rows,
@@ -136,7 +178,7 @@ impl Flat {
 }
 
 /// Effort of every output at every state, for given linear parameters; that of known elements included. Friction that remembers
-/// the motion (LuGre) is in its steady state.
+/// the motion (`lugre`, `maxwell_slip`) follows states that have a [time](States::time), from the steady state of the first; elsewhere it is in its steady state.
 ///
 /// # Errors
 /// [`Error::StatesChannel`]: the states lack a channel that the model reads, a temperature; [`Error::Pose`]: a mechanism with

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use dynid::io::{ReadOptions, csv};
 use dynid::log::as_logged;
+use dynid::model::EffortModel as _;
 use dynid::predict::{efforts, read_states};
 use dynid::{Error, Estimate};
 use dynid_terminal::message::{Failure, Notes, data, json};
@@ -29,6 +30,11 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
             other => other,
         },
     )?;
+    if states.time.is_none() && !model.signals().is_empty() {
+        Notes::new(args.quiet).tell(
+            "friction of this model remembers the motion, and the table has no column `t` that ascends: it is taken in its steady state",
+        );
+    }
     let effort = as_logged(&model, efforts(&model, &estimate.values(split), &states)?);
     drop(progress);
     match &args.out {

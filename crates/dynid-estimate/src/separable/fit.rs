@@ -3,7 +3,7 @@
 use super::estimate::{SeparableEstimate, kappa};
 use super::levenberg::{SearchStatus, Stops, search};
 use super::polish::polish;
-use super::problem::{SeparableProblem, check};
+use super::problem::{RowGroup, SeparableProblem, check};
 use super::profile::{Minimum, ShapeFinding, ShapeVerdict};
 use super::reduction::{GroupReduction, Target};
 use super::robust::{Robust, refine_robust};
@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-9;
 ///
 /// 1. Multi-start of Levenberg-Marquardt searches on the projected residual, with variances of a linear fit at the given
 ///    start; then variances and parameters in turn until both settle.
-/// 2. Profiles: shape parameters that the data do not see are held at their start, the flattest first, and the others
+/// 2. Profiles: shape parameters that the data do not see are held at their start, the flattest of each group of rows first, and the others
 ///    fitted again (unless [`SeparableSettings::hold_unseen`] is off).
 /// 3. Robust losses: iteratively re-weighted from there.
 /// 4. Gauss-Newton on all parameters together for the last digits, and the covariance of all of them.
@@ -43,14 +43,21 @@ pub fn fit(
     check(problem)?;
     let mut work = Work::new(problem, settings)?;
     let (report, mut status) = work.global()?;
-    let mut findings = work.findings();
+    let mut findings = work.findings(None);
     let mut judged: Vec<Option<ShapeFinding>> = vec![None; findings.len()];
-    while let Some(flattest) = flattest(&findings).filter(|_| settings.hold_unseen) {
-        judged[flattest] = Some(findings[flattest].clone());
-        work.held[flattest] = true;
-        work.u[flattest] = work.bounds.start[flattest];
+    loop {
+        let flattest = if settings.hold_unseen { flattest(&findings, problem.groups()) } else { Vec::new() };
+        if flattest.is_empty() {
+            break;
+        }
+        for k in flattest {
+            judged[k] = Some(findings[k].clone());
+            work.held[k] = true;
+            work.u[k] = work.bounds.start[k];
+        }
         status = work.settle()?;
-        findings = work.findings();
+        // What was seen stays so where fewer parameters can make up for it.
+        findings = work.findings(Some(&findings));
     }
     for (finding, earlier) in findings.iter_mut().zip(judged) {
         if let Some(earlier) = earlier {
@@ -60,12 +67,22 @@ pub fn fit(
     work.finish(report, status, findings)
 }
 
-/// The least seen of the shape parameters that are not seen.
-fn flattest(findings: &[ShapeFinding]) -> Option<usize> {
+/// The least seen of the shape parameters that are not seen, one of those that change rows of the same group: others cannot stand in for
+/// each other.
+fn flattest(findings: &[ShapeFinding], groups: &[RowGroup]) -> Vec<usize> {
     let range = |k: &usize| findings[*k].profile.iter().map(|p| p.1).fold(0.0, f64::max);
-    (0..findings.len())
-        .filter(|k| findings[*k].verdict == ShapeVerdict::NotSeen)
-        .min_by(|a, b| range(a).total_cmp(&range(b)))
+    let mut unseen: Vec<usize> =
+        (0..findings.len()).filter(|k| findings[*k].verdict == ShapeVerdict::NotSeen).collect();
+    unseen.sort_by(|a, b| range(a).total_cmp(&range(b)));
+    let changes = |group: &RowGroup, k: usize| group.dependence.iter().any(|(_, p)| *p == k);
+    let share_rows = |a: usize, b: usize| groups.iter().any(|g| changes(g, a) && changes(g, b));
+    let mut out: Vec<usize> = Vec::new();
+    for k in unseen {
+        if !out.iter().any(|other| share_rows(*other, k)) {
+            out.push(k);
+        }
+    }
+    out
 }
 
 impl Work<'_> {
@@ -178,7 +195,8 @@ impl Work<'_> {
         Ok(change)
     }
 
-    fn findings(&self) -> Vec<ShapeFinding> {
+    /// Findings of all shape parameters, of those alone that were not seen `before`.
+    fn findings(&self, before: Option<&[ShapeFinding]>) -> Vec<ShapeFinding> {
         let linearised = self.linearised().ok();
         let inflation = linearised.as_ref().map_or(1.0, kappa);
         let projection = self.projection();
@@ -200,7 +218,7 @@ impl Work<'_> {
             rise: self.settings.profile_rise * inflation,
             points: self.settings.profile_points,
         };
-        minimum.findings(self.problem)
+        minimum.findings(self.problem, before)
     }
 
     fn finish(

@@ -12,6 +12,9 @@ const MOST_ITERATIONS: usize = 20;
 /// Fall of the loss, as a share of the rise that counts, at which a point of a profile is done.
 const DONE: f64 = 0.01;
 
+/// Rise, in parts of what counts, beyond which a profile goes no further.
+const ENOUGH: f64 = 4.0;
+
 /// What the data say about a shape parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ShapeVerdict {
@@ -38,7 +41,8 @@ pub enum ShapeVerdict {
 pub struct ShapeFinding {
     /// Verdict.
     pub verdict: ShapeVerdict,
-    /// `(value, (rss - least rss)/σ̂²)` between the bounds, ascending; the estimate is among the points.
+    /// `(value, (rss - least rss)/σ̂²)` between the bounds, ascending, to either side as far as the loss rises to four times what counts; the
+    /// estimate is among the points.
     pub profile: Vec<(f64, f64)>,
     /// The bound at which the estimate lies, if it does.
     pub at_bound: Option<Bound>,
@@ -61,9 +65,15 @@ pub(super) struct Minimum<'a> {
 }
 
 impl Minimum<'_> {
-    /// Findings of all shape parameters.
-    pub(super) fn findings(&self, problem: &dyn SeparableProblem) -> Vec<ShapeFinding> {
-        (0..self.u.len()).into_par_iter().map(|k| self.finding(problem, k)).collect()
+    /// Findings of all shape parameters; those that were seen `before` stay.
+    pub(super) fn findings(
+        &self,
+        problem: &dyn SeparableProblem,
+        before: Option<&[ShapeFinding]>,
+    ) -> Vec<ShapeFinding> {
+        let stays = |k: usize| before.map(|all| &all[k]).filter(|f| f.verdict != ShapeVerdict::NotSeen);
+        let finding = |k: usize| stays(k).cloned().unwrap_or_else(|| self.finding(problem, k));
+        (0..self.u.len()).into_par_iter().map(finding).collect()
     }
 
     fn finding(&self, problem: &dyn SeparableProblem, k: usize) -> ShapeFinding {
@@ -98,8 +108,8 @@ impl Minimum<'_> {
         self.bounds.natural(&all)[k]
     }
 
-    /// `(u_k, rss)` on a grid between the bounds and at the minimum, from the minimum outwards on either side. A point at
-    /// which the model is not finite counts as infinitely bad.
+    /// `(u_k, rss)` on a grid between the bounds and at the minimum, from the minimum outwards on either side until the loss has risen
+    /// enough. A point at which the model is not finite counts as infinitely bad.
     fn profile(&self, k: usize) -> Vec<(f64, f64)> {
         let (lower, upper) = (self.bounds.lower[k], self.bounds.upper[k]);
         let last = (self.points.max(2) - 1) as f64;
@@ -127,7 +137,14 @@ impl Minimum<'_> {
                     None => (value, f64::INFINITY),
                 }
             };
-            points.into_iter().map(visit).collect::<Vec<(f64, f64)>>()
+            let mut out = Vec::with_capacity(points.len());
+            for point in points.into_iter().map(visit) {
+                out.push(point);
+                if point.1 - self.rss > ENOUGH * self.rise * self.variance {
+                    break;
+                }
+            }
+            out
         };
         let below: Vec<f64> = grid.iter().rev().copied().filter(|g| *g < self.u[k]).collect();
         let above: Vec<f64> = grid.iter().copied().filter(|g| *g > self.u[k]).collect();

@@ -132,7 +132,8 @@ fn subject(robot: &Robot, config: &DesignConfig) -> Result<(Subject, RobotExcita
     }
     let default = config.elements.default.as_deref();
     let plan = ElementPlan::new(mechanism, &elements, default, |rate| robot.is_driven(rate))?
-        .with_loops(robot.closed.clone());
+        .with_loops(robot.closed.clone())
+        .in_steady_motion();
     let model = plan.tied_model(mechanism)?;
     let model = Arc::new(with_nominal_shape(model, &plan, &config.values)?);
     let nominal = match mechanism.bodies().iter().any(|b| b.stated) {

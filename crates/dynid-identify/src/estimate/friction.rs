@@ -9,8 +9,13 @@ pub struct FrictionTrial {
     pub joint: String,
     /// Element that stands for the shape.
     pub element: String,
-    /// Speed of the shape (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
-    pub speed: Option<f64>,
+    /// Value of the shape's own parameter in the grid of the search: a speed (`vs`, `w`), rad/s or m/s, an exponent (`p`), or a travel
+    /// (`travel`), rad or m; absent where the shape has none. Earlier files call it `speed`.
+    #[serde(alias = "speed")]
+    pub value: Option<f64>,
+    /// Unit of the value; empty where there is none.
+    #[serde(default)]
+    pub unit: String,
     /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
     /// another one beside the choice.
     pub gain: f64,

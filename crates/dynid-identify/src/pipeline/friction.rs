@@ -22,6 +22,8 @@ pub(super) fn choose(
     progress: &mut dyn FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
     let settings = problem.conditioning_settings();
+    // Neither searches nor factors of logs have a form for friction that remembers the motion.
+    let remembers = problem.settings.estimator.search.is_none() && problem.plan.log_terms.scaled().is_empty();
     let Problem { model, structure, plan, logs, .. } = problem;
     let unloaded = model.mechanism().follows().is_some() || model.closed().is_some();
     let rates = model.mechanism().rates();
@@ -31,7 +33,9 @@ pub(super) fn choose(
             Some(_) => Vec::new(),
             None => {
                 let elements = &plan.per_rate[model.tree_rate(rate)];
-                shapes_beside(plan.registry(), elements, unloaded || rate >= rates)
+                let mut kinds = shapes_beside(plan.registry(), elements, unloaded || rate >= rates);
+                kinds.retain(|kind| remembers || *kind != ShapeKind::MaxwellSlip);
+                kinds
             }
         })
         .collect();
@@ -92,6 +96,10 @@ pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut
     let (model, plan) = (&found.model, &mut problem.plan);
     let table = model.parameters();
     let unseen = |joint: &str, trial: &ShapeTrial| {
+        // Held-out blocks saw that friction gives way; over how little a travel may stay unknown.
+        if trial.shape.kind == ShapeKind::MaxwellSlip {
+            return false;
+        }
         let (_, Some(symbol)) = shape_element(trial.shape.kind) else { return false };
         let name = format!("{joint}.{symbol}");
         let place = table.shape.iter().position(|s| s.name == name);
@@ -102,12 +110,15 @@ pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut
         trial.shape.kind == ShapeKind::Stribeck
             && matches!((value("fs"), value("fc")), (Some(fs), Some(fc)) if fs < fc)
     };
+    let drives = |joint: &str, trial: &ShapeTrial| {
+        let fm = table.column(&format!("{joint}.fm")).map(|c| found.linear[c]);
+        trial.shape.kind == ShapeKind::MaxwellSlip && fm.is_some_and(|fm| fm < 0.0)
+    };
     let mut dropped = false;
     for (rate, (output, joint)) in model.outputs().iter().zip(chosen).enumerate() {
-        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) = joint
-            .accepted
-            .drain(..)
-            .partition(|trial| unseen(&output.name, trial) || rises(&output.name, trial));
+        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) = joint.accepted.drain(..).partition(|trial| {
+            unseen(&output.name, trial) || rises(&output.name, trial) || drives(&output.name, trial)
+        });
         joint.accepted = kept;
         for trial in gone {
             plan.remove_shape(model.tree_rate(rate), &output.name, &trial.shape);
@@ -131,9 +142,13 @@ mod tests {
             shapes_beside(&ElementRegistry::default(), &list, false)
         };
         assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), ShapeKind::ALL);
-        assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude, ShapeKind::Load]);
-        assert_eq!(kinds(&["asymmetric"]), [ShapeKind::Tanh]);
-        assert_eq!(kinds(&["coulomb", "viscous", "viscous_magnitude", "arctangent"]), [ShapeKind::Load]);
+        assert_eq!(
+            kinds(&["stribeck", "viscous"]),
+            [ShapeKind::ViscousMagnitude, ShapeKind::Load, ShapeKind::MaxwellSlip]
+        );
+        assert_eq!(kinds(&["asymmetric"]), [ShapeKind::Tanh, ShapeKind::MaxwellSlip]);
+        let shaped = ["coulomb", "viscous", "viscous_magnitude", "arctangent"];
+        assert_eq!(kinds(&shaped), [ShapeKind::Load, ShapeKind::MaxwellSlip]);
         assert_eq!(kinds(&["rotor"]), []);
     }
 }

@@ -1,10 +1,11 @@
 //! From chosen friction and shape parameters to the linear model that is fitted.
 
-use dynid_model::EffortModel;
+use dynid_model::{EffortModel, Output};
 use dynid_rows::conditioning::{Conditioning, JointFriction};
 
 use super::{Step, friction};
 use crate::Error;
+use crate::elements::shape_element;
 use crate::problem::Problem;
 use crate::settings::Friction;
 use crate::shape::{self, ShapeFit, Start};
@@ -60,13 +61,14 @@ pub(super) fn search(
         problem.rebuild()?;
         out.friction = chosen.per_output;
         *choices = chosen.conditioning;
+        start = of_chosen(problem, &out.friction);
     }
     while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
         let found = shape::find(problem, choices, &start)?;
         if friction::drop_refuted(problem, &found, &mut out.friction) {
             problem.rebuild()?;
-            start = Start::Stated;
+            start = of_chosen(problem, &out.friction);
             continue;
         }
         let free = found.free();
@@ -75,4 +77,18 @@ pub(super) fn search(
         out.found = Some(found);
     }
     Ok(out)
+}
+
+/// Where a search starts after shapes were chosen.
+fn of_chosen(problem: &Problem, chosen: &[JointFriction]) -> Start {
+    let is_chosen = |name: &str| {
+        let of_joint = |(output, joint): (&Output, &JointFriction)| {
+            let mut symbols = joint.accepted.iter().filter_map(|t| shape_element(t.shape.kind).1);
+            let symbol = name.strip_prefix(&output.name).and_then(|rest| rest.strip_prefix('.'));
+            symbols.any(|s| symbol == Some(s))
+        };
+        problem.model.outputs().iter().zip(chosen).any(of_joint)
+    };
+    let all = problem.model.parameters().shape.iter().all(|s| is_chosen(&s.name));
+    if all { Start::Chosen } else { Start::Stated }
 }

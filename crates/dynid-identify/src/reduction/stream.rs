@@ -8,7 +8,7 @@ use dynid_factor::rows::{BlockReducer, GroupShape, RowSource, RowVisitor, Rows, 
 use dynid_motion::clock::GridRows;
 use dynid_motion::{Channel, Portion, log::moves};
 use dynid_rows::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, RecordFigures, least_block_samples,
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, Recall, RecordFigures, least_block_samples,
 };
 
 use super::reduce::{Examined, Rest};
@@ -30,15 +30,10 @@ const PARTS: usize = 4;
 const KEPT_VALUES: usize = 1 << 16;
 
 impl Reducer {
-    /// Whether logs of these settings can be reduced window by window: not those of a stated period, of mechanisms with loops or journals, and
-    /// of elements that remember.
+    /// Whether logs of these settings can be reduced window by window: not those of a stated period, of mechanisms with loops or journals.
     pub fn in_windows(&self, settings: &LogSettings) -> bool {
-        use dynid_model::EffortModel;
         let model = &self.problem.model;
-        settings.period_s.is_none()
-            && model.closed().is_none()
-            && model.journals().is_none()
-            && model.signals().is_empty()
+        settings.period_s.is_none() && model.closed().is_none() && model.journals().is_none()
     }
 
     /// Reduces a log that comes in parts, in one pass and in memory that does not grow with it.
@@ -122,8 +117,8 @@ impl Reducer {
         let state_hz = choices.state_hz[0];
         let figures = RecordFigures::of(&prepared, model, state_hz, &conditioned)?;
         let delay = choices.delay.samples;
-        let (overlap, grid) = figures.overlap(&choices.scales_hz, state_hz, delay, &conditioned)?;
-        let layout = Layout { samples: self.windows.samples, overlap, grid };
+        let reach = figures.overlap(&choices.scales_hz, state_hz, delay, &conditioned)?;
+        let layout = Layout { samples: self.windows.samples, overlap: reach.overlap, grid: reach.grid };
         let laid = GridRows::new(&prepared.name, &conditioned.clock, figures.clock(), self.windows.part_rows);
         let place = |name: &String| read.held.joints.iter().position(|joint| joint.name == *name);
         let joints: Vec<usize> =
@@ -134,7 +129,7 @@ impl Reducer {
         prepared.start = read.held.time[0];
         let Examining { part, held, rest } = read;
         let mut windows = Windows::new(&prepared.name, laid, layout, joints, held, rest);
-        let mut pass = Pass::new(self, &choices, &conditioned, &figures, &prepared);
+        let mut pass = Pass::new(self, &choices, &conditioned, &figures, reach.kernels, &prepared);
         let mut at_hand: Option<Stretch> = None;
         loop {
             // While a window is reduced, the next one is read.
@@ -237,6 +232,10 @@ struct Pass<'a> {
     /// Windows are not cut into time blocks by themselves.
     settings: ConditioningSettings,
     figures: &'a RecordFigures,
+    /// Samples that rows reach before a window.
+    reach: usize,
+    /// What elements remember before a sample of the log.
+    recall: Recall,
     most_blocks: usize,
     merged: usize,
     /// Whether rows have columns for the rest of delays.
@@ -253,6 +252,7 @@ impl<'a> Pass<'a> {
         choices: &'a Conditioning,
         conditioned: &ConditioningSettings,
         figures: &'a RecordFigures,
+        reach: usize,
         part: &'a PreparedLog,
     ) -> Self {
         // Rungs above those of the recipe are nobody's.
@@ -264,6 +264,8 @@ impl<'a> Pass<'a> {
             choices,
             settings,
             figures,
+            reach,
+            recall: Recall::default(),
             most_blocks: reducer.recipe.blocks.most.max(1),
             merged: reducer.recipe.blocks.merged,
             delays: reducer.recipe.has_delays(),
@@ -283,6 +285,11 @@ impl<'a> Pass<'a> {
         let (shape, kept) = (&structure.shape, &structure.base.kept);
         let rows = LogRows::new(model, shape, kept, logs, self.choices, &self.settings)?;
         let rows = if self.delays { rows.with_delay_columns()? } else { rows };
+        // From where the rows of this window begin: states there are free of the ends of this window and of the one before.
+        let Recall { sample, history } = std::mem::take(&mut self.recall);
+        let rows = rows.recalling(vec![Recall { sample: sample.saturating_sub(from), history }]);
+        let next = core.end.saturating_sub(self.reach);
+        self.recall = Recall { sample: next, history: rows.history_at(0, next.saturating_sub(from)) };
         if self.blocks.is_empty() {
             let length = least_block_samples(self.choices.kernel_hz, prepared.rate_hz, &self.settings);
             let blocks = |shape: &GroupShape| {

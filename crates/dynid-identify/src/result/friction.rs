@@ -1,6 +1,7 @@
 //! Friction shapes in words and records.
 
 use dynid_model::EffortModel;
+use dynid_model::element::ElementRegistry;
 use dynid_rows::conditioning::{JointFriction, ShapeTrial};
 
 use crate::elements::shape_element;
@@ -10,12 +11,18 @@ use crate::known_friction::KnownFriction;
 
 /// All shapes tried, joint after joint, accepted ones first.
 pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {
+    let registry = ElementRegistry::default();
+    let joints = id.model.joints();
     let record = |joint: &str, trial: &ShapeTrial, accepted: bool| {
-        let (element, speed) = shape_element(trial.shape.kind);
+        let (element, symbol) = shape_element(trial.shape.kind);
+        let terms = registry.kind(element).map_or(&[][..], |kind| &kind.shape);
+        let term = terms.iter().find(|term| Some(term.symbol) == symbol);
+        let slides = joints.iter().any(|j| j.name == joint && j.slides);
         FrictionTrial {
             joint: joint.to_owned(),
             element: element.to_owned(),
-            speed: speed.map(|_| trial.shape.value),
+            value: term.map(|_| trial.shape.value),
+            unit: term.map_or("", |term| term.units[usize::from(slides)]).to_owned(),
             gain: trial.gain,
             standard_error: trial.standard_error,
             accepted,
@@ -33,10 +40,16 @@ pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {
         .collect()
 }
 
+/// With three decimals, of less than 0.01 with three significant digits.
+fn significant(value: f64) -> String {
+    let digits = if value < 0.01 { (2.0 - value.log10().floor()).clamp(3.0, 9.0) } else { 3.0 };
+    format!("{value:.*}", digits as usize)
+}
+
 /// Shapes of a joint, and why these.
 pub(super) fn in_words(joint: &JointFriction) -> (Vec<String>, String) {
     let name = |t: &ShapeTrial| match shape_element(t.shape.kind) {
-        (element, Some(key)) => format!("{element} ({key} {:.3})", t.shape.value),
+        (element, Some(key)) => format!("{element} ({key} {})", significant(t.shape.value)),
         (element, None) => element.to_owned(),
     };
     let gain =

@@ -36,7 +36,7 @@ pub use external_load::{ExternalLoad, load_channel};
 pub use formula::{FormulaFault, FormulaLaw, FormulaLawFault, FormulaTerms, RESERVED, kept};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, JournalFriction,
-    LoadFriction, LuGre, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck,
+    LoadFriction, LuGre, MaxwellSlip, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck,
     StribeckViscous, TanhFriction, Viscous, ViscousMagnitude, journal_moment_channel, reaction_channel,
     weight_channel,
 };

@@ -3,7 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Coulomb, ExponentialViscous, JointElement, Linearised, LuGre, ShapeSetting, Stribeck, Viscous,
+    Coulomb, ExponentialViscous, JointElement, Linearised, LuGre, MaxwellSlip, ShapeSetting, Stribeck,
+    Viscous,
 };
 use dynid_model::*;
 use dynid_testing::golden;
@@ -393,4 +394,112 @@ fn least_passive_viscosity_of_the_indy7() {
 fn a_missing_temperature_is_named() {
     let model = RobotModel::new(row(1), vec![Box::new(ExponentialViscous::new(0))]);
     Motion::new(vec![vec![0.5]], None).efforts(&model, &[1.3, 0.8], &[0.0; 12], &[]);
+}
+
+/// Positions to and fro, fast and slow, with a stand in the middle at which the position still creeps.
+fn to_and_fro() -> (Vec<f64>, Vec<f64>) {
+    let q = |k: usize| 0.02 * (0.031 * k as f64).sin() + 0.011 * (0.0173 * k as f64 + 0.4).sin();
+    let q: Vec<f64> = (0..600)
+        .map(|k| if (200..260).contains(&k) { q(200) + 1e-6 * (k % 3) as f64 } else { q(k) })
+        .collect();
+    let stands = |k: usize| (200..260).contains(&k);
+    let dq = (0..600)
+        .map(|k| if stands(k) { 0.0 } else { (q[(k + 1).min(599)] - q[k.saturating_sub(1)]) * 500.0 });
+    let dq = dq.collect();
+    (q, dq)
+}
+
+/// Signals of one joint along [`to_and_fro`], formed in blocks that end at the cuts and at the end.
+fn slip_signals(model: &RobotModel, shape: &[f64], cuts: &[usize]) -> Vec<Vec<f64>> {
+    let ((q, dq), rest) = (to_and_fro(), vec![0.0; 600]);
+    let count = model.signals().len();
+    let mut all = vec![Vec::new(); count];
+    let (mut history, mut start) = (History::default(), 0);
+    for end in cuts.iter().copied().chain([600]) {
+        let n = end - start;
+        let mut part = vec![f64::NAN; count * n];
+        let block = MotionBlock::plain(n, &q[start..end], &dq[start..end], &rest[..n]);
+        // Displacements alone count, whatever the time between samples.
+        model.remember(&block, 0.7, shape, &mut history, n, &mut part);
+        all.iter_mut().zip(part.chunks(n)).for_each(|(to, from)| to.extend_from_slice(from));
+        start = end;
+    }
+    all
+}
+
+/// The stop operator is what the play operator leaves of the position: `w = (q - p)/travel` with `p` dragged along.
+#[test]
+fn a_maxwell_slip_element_is_what_play_leaves_of_the_position() {
+    let travel = 0.004;
+    let model = RobotModel::new(row(1), vec![Box::new(MaxwellSlip { rate: 0, travel: held(travel) })]);
+    assert_eq!(model.signals(), ["j1.slip_spring"]);
+    let signals = slip_signals(&model, &[], &[]);
+    let (q, dq) = to_and_fro();
+    let (mut dragged, mut crept) = (q[0] - travel * dq[0].signum(), 0.0);
+    let mut reached = [0; 3];
+    for (k, w) in signals[0].iter().enumerate() {
+        if dq[k] == 0.0 {
+            // What the position does at rest moves the play along with it.
+            crept += q[k] - q[k - 1];
+        }
+        let position = q[k] - crept;
+        dragged = dragged.clamp(position - travel, position + travel);
+        assert!((w - (position - dragged) / travel).abs() < 1e-12, "sample {k}: {w}");
+        reached[if w.abs() < 1.0 {
+            0
+        } else if *w > 0.0 {
+            1
+        } else {
+            2
+        }] += 1;
+    }
+    assert!(reached.iter().all(|n| *n > 50), "{reached:?}");
+    for cuts in [vec![1, 2, 40, 230], (1..600).collect()] {
+        assert_eq!(signals, slip_signals(&model, &[], &cuts), "bit for bit");
+    }
+}
+
+#[test]
+fn derivatives_of_a_slip_spring_are_those_of_central_differences() {
+    let model = RobotModel::new(row(1), vec![Box::new(MaxwellSlip { rate: 0, travel: free(0.004) })]);
+    let [spring, by_travel] = &slip_signals(&model, &[0.004], &[])[..] else { panic!("two signals") };
+    let h = 1e-9;
+    let [above, below] = [h, -h].map(|h| slip_signals(&model, &[0.004 + h], &[]));
+    let scale = by_travel.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let mut compared = 0;
+    for (k, found) in by_travel.iter().enumerate() {
+        // Where it slips there is a kink.
+        if spring[k].abs() > 1.0 - 1e-4 {
+            assert_eq!(*found == 0.0, spring[k].abs() == 1.0, "sample {k}");
+            continue;
+        }
+        let difference = (above[0][k] - below[0][k]) / (2.0 * h);
+        assert!((found - difference).abs() < 1e-5 * scale, "sample {k}: {found} {difference}");
+        compared += 1;
+    }
+    assert!(compared > 100 && scale > 100.0, "{compared} samples, {scale}");
+}
+
+/// Without the motion before it is Coulomb friction, in values and in derivatives by the motion.
+#[test]
+fn without_the_motion_before_a_slip_spring_is_the_sign() {
+    let springs = RobotModel::new(row(1), vec![Box::new(MaxwellSlip::new(0))]);
+    let coulomb = RobotModel::new(row(1), vec![Box::new(Coulomb { rate: 0 })]);
+    let motion = Motion::new(vec![velocities(60)], None);
+    let linear: Vec<f64> = [0.0; 10].into_iter().chain([0.7]).collect();
+    let shape = springs.parameters().shape_start();
+    let found = motion.efforts(&springs, &shape, &linear, &[]);
+    assert_eq!(found, motion.efforts(&coulomb, &[], &linear, &[]));
+    let slope = |model: &RobotModel, shape: &[f64]| {
+        let mut out = MotionAdjoint::new(1, 1, 60);
+        motion.with(0..60, &[], |m| {
+            let smooth = MotionBlock { sign_width: 0.1, ..*m };
+            model.effort_adjoint(&smooth, shape, &linear, 60, &[1.0; 60], &mut out);
+        });
+        out.dq
+    };
+    assert_eq!(slope(&springs, &shape), slope(&coulomb, &[]));
+    let table = springs.parameters();
+    assert_eq!((table.shape[0].name.as_str(), table.shape[0].unit), ("j1.travel", "rad"));
+    assert_eq!(table.linear[10].lower, Some(0.0));
 }

@@ -46,11 +46,11 @@ pub(super) fn laws() -> Vec<Chart> {
 }
 
 pub(super) fn trials() -> Vec<FrictionTrial> {
-    let trial = |element: &str, speed: Option<f64>, gain: f64, error: f64, accepted: bool| FrictionTrial {
+    let trial = |element: &str, value: Option<f64>, gain: f64, error: f64, accepted: bool| FrictionTrial {
         joint: "joint_2".into(),
         element: element.into(),
-        speed,
-        speed_unit: "rad/s".into(),
+        value,
+        unit: "rad/s".into(),
         gain_percent: Some(gain),
         standard_error_percent: Some(error),
         accepted,

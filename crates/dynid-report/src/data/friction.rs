@@ -31,10 +31,10 @@ pub struct FrictionTrial {
     pub joint: String,
     /// Element that stands for the shape.
     pub element: String,
-    /// Speed that the shape has, in `speed_unit`.
-    pub speed: Option<f64>,
-    /// Unit of `speed`.
-    pub speed_unit: String,
+    /// Speed, exponent or travel that the shape has.
+    pub value: Option<f64>,
+    /// Unit of `value`.
+    pub unit: String,
     /// By how much the mean square of the held-out error falls, %.
     pub gain_percent: Option<f64>,
     /// Standard error of the gain, %.

@@ -115,7 +115,7 @@ fn hollow(text: &str) -> ReportData {
         friction_trials: vec![FrictionTrial {
             joint: text(),
             element: text(),
-            speed_unit: text(),
+            unit: text(),
             ..Default::default()
         }],
         motions: vec![text()],

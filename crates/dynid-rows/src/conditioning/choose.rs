@@ -338,11 +338,13 @@ pub(crate) fn masks(
     (current, table)
 }
 
-/// Rungs once more, with friction shapes in the fit: joint by joint from `rung`, losses on all rows off reversal.
+/// Rungs once more, with friction shapes in the fit: joint by joint from `rung`, losses on all rows off reversal. Outputs that are `held` keep
+/// theirs.
 pub(crate) fn masks_again(
     trial: &Trial,
     rung: &[usize],
     shapes: &[Vec<usize>],
+    held: &[bool],
     delay: f64,
     settings: &ConditioningSettings,
 ) -> Vec<usize> {
@@ -358,7 +360,7 @@ pub(crate) fn masks_again(
     let mut current = rung.to_vec();
     let mut current_losses = score(current.clone());
     let (sigmas, share) = settings.friction.mask_again;
-    for output in 0..outputs {
+    for output in (0..outputs).filter(|output| !held[*output]) {
         for rung in 1..rungs {
             if trial.allowed(output, rung, settings.least_usable) != rung || rung == current[output] {
                 continue;

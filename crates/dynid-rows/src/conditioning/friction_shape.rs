@@ -1,6 +1,6 @@
 //! Shapes of friction, and the candidates for a joint.
 
-use dynid_model::element::{Velocity, VelocityLaw as _, laws, sign};
+use dynid_model::element::{MaxwellSlip, Velocity, VelocityLaw as _, laws, sign};
 
 use super::states::States;
 
@@ -17,16 +17,19 @@ pub enum ShapeKind {
     Power,
     /// `|τ| s(v)` with the rigid effort `τ` of an earlier fit: friction of loaded gears.
     Load,
+    /// [`MaxwellSlip`]: friction that gives way over a travel after a reversal.
+    MaxwellSlip,
 }
 
 impl ShapeKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [ShapeKind; 5] = [
+    pub const ALL: [ShapeKind; 6] = [
         ShapeKind::ViscousMagnitude,
         ShapeKind::Stribeck,
         ShapeKind::Tanh,
         ShapeKind::Power,
         ShapeKind::Load,
+        ShapeKind::MaxwellSlip,
     ];
 
     /// Name of the element that it is one of.
@@ -37,6 +40,7 @@ impl ShapeKind {
             ShapeKind::Tanh => "tanh",
             ShapeKind::Power => "power",
             ShapeKind::Load => "load",
+            ShapeKind::MaxwellSlip => "maxwell_slip",
         }
     }
 
@@ -47,12 +51,12 @@ impl ShapeKind {
     }
 }
 
-/// A column of friction over the speed `v` of a joint.
+/// A column of friction of a joint over its speed `v`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionShape {
     /// Which law.
     pub kind: ShapeKind,
-    /// `v_s` or `v_c`, rad/s or m/s, or the exponent `p`; 1 and without meaning for the other kinds.
+    /// `v_s` or `v_c`, rad/s or m/s, the exponent `p`, or the travel, rad or m; 1 and without meaning for the other kinds.
     pub value: f64,
 }
 
@@ -65,8 +69,15 @@ impl FrictionShape {
         }
     }
 
-    /// The column, one entry per speed. `loads`: rigid efforts at the same samples; read by [`ShapeKind::Load`] alone.
-    pub(crate) fn column(&self, speeds: &[f64], loads: &[f64]) -> Vec<f64> {
+    /// The column, one entry per speed. At the same samples: `loads`, rigid efforts, read by [`ShapeKind::Load`] alone, and `positions`, read by
+    /// [`ShapeKind::MaxwellSlip`] alone, whose `spring` is taken on to the last of them.
+    pub(crate) fn column(
+        &self,
+        positions: &[f64],
+        speeds: &[f64],
+        loads: &[f64],
+        spring: &mut SlipSpring,
+    ) -> Vec<f64> {
         let velocities = speeds.iter().map(|v| Velocity::new(*v));
         match self.kind {
             ShapeKind::ViscousMagnitude => {
@@ -78,7 +89,33 @@ impl FrictionShape {
             ShapeKind::Tanh => velocities.map(|v| laws::Tanh.columns(v, [self.value])[0]).collect(),
             ShapeKind::Power => velocities.map(|v| laws::Power.columns(v, [self.value])[0]).collect(),
             ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
+            ShapeKind::MaxwellSlip => {
+                positions.iter().zip(speeds).map(|(q, v)| spring.moved_to(*q, *v, self.value)).collect()
+            }
         }
+    }
+}
+
+/// What friction that gives way remembers of the motion.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SlipSpring {
+    /// Its effort in parts of that at which it slips.
+    bent: f64,
+    position: f64,
+}
+
+impl SlipSpring {
+    /// At the start of a record.
+    pub(crate) fn at(position: f64, speed: f64) -> Self {
+        SlipSpring { bent: sign(speed), position }
+    }
+
+    fn moved_to(&mut self, position: f64, speed: f64, travel: f64) -> f64 {
+        if speed != 0.0 {
+            self.bent = MaxwellSlip::after(self.bent, (position - self.position) / travel);
+        }
+        self.position = position;
+        self.bent
     }
 }
 
@@ -93,16 +130,27 @@ const EXPONENTS: [f64; 7] = [0.25, 0.35, 0.45, 0.55, 0.7, 1.4, 1.8];
 const LEAST: (f64, f64) = (0.03, 3.0);
 /// Largest `v_c` in parts of the rms speed.
 const WIDEST_TANH: f64 = 2.5;
+/// Travels in parts of the range of positions, their number, and standard deviations of position noise that the least one is above.
+const TRAVEL: (f64, f64) = (1e-4, 0.02);
+const TRAVELS: usize = 9;
+const TRAVEL_SIGMAS: f64 = 3.0;
 /// A joint moves in one direction if a smaller share of the samples in which it moves goes in the other.
 const ONE_WAY: f64 = 0.01;
 
 /// Candidates of an output, kind after kind, speeds ascending; none where it moves in one direction only. Speeds are parts of the rms speed in
 /// the log in which it is greatest.
 pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -> Vec<FrictionShape> {
-    let (mut rms, mut noise, mut samples) = (0.0_f64, 0.0, 0.0);
+    let (mut rms, mut noise, mut samples, mut range) = (0.0_f64, 0.0, 0.0, 0.0_f64);
+    let mut still = 0.0_f64;
     let mut ways = [0usize; 2];
     for log in states {
         let sigma = log.velocity_sigma[output];
+        let (low, high) = log
+            .position(output)
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(*q), high.max(*q)));
+        range = range.max(high - low);
+        still = still.max(sigma / log.cutoff_hz);
         let mut square = 0.0;
         for v in &log.velocity(output) {
             square += v * v;
@@ -119,12 +167,19 @@ pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -
         return Vec::new();
     }
     let least = (LEAST.0 * rms).max(LEAST.1 * (noise / samples).sqrt());
-    let speeds = |kind: ShapeKind, most: f64, count: usize| -> Vec<FrictionShape> {
+    let steps = |kind: ShapeKind, least: f64, most: f64, count: usize| -> Vec<FrictionShape> {
         if least >= most {
             return Vec::new();
         }
         let ratio = (most / least).powf(1.0 / (count - 1) as f64);
         (0..count).map(|k| FrictionShape { kind, value: least * ratio.powi(k as i32) }).collect()
+    };
+    let speeds = |kind: ShapeKind, most: f64, count: usize| steps(kind, least, most, count);
+    let travels = || {
+        // White noise below a cut-off: its positions in parts of its velocities.
+        let noise = still * 3.0_f64.sqrt() / std::f64::consts::TAU;
+        let least = (TRAVEL.0 * range).max(TRAVEL_SIGMAS * noise);
+        steps(ShapeKind::MaxwellSlip, least, TRAVEL.1 * range, TRAVELS)
     };
     kinds
         .iter()
@@ -133,6 +188,7 @@ pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -
             ShapeKind::Stribeck => speeds(*kind, rms, STRIBECK),
             ShapeKind::Tanh => speeds(*kind, WIDEST_TANH * rms, TANH),
             ShapeKind::Power => EXPONENTS.iter().map(|p| FrictionShape { kind: *kind, value: *p }).collect(),
+            ShapeKind::MaxwellSlip => travels(),
         })
         .collect()
 }

@@ -1,12 +1,12 @@
 //! Rows of the final fit, formed from the logs on every pass.
 
-use dynid_model::EffortModel;
+use dynid_model::{EffortModel, History};
 use dynid_motion::{Kernel, shift};
 use rayon::prelude::*;
 
 use super::masks::Masks;
 use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
-use super::states::States;
+use super::states::{Recall, States};
 use super::windows::means;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_estimate::instruments::paired_columns;
@@ -186,6 +186,23 @@ impl<'a> LogRows<'a> {
             group.columns.push(self.columns.total + group.output);
         }
         Ok(self)
+    }
+
+    /// Rows of logs each of which goes on from what an earlier record left, where elements remember the motion.
+    ///
+    /// # Panics
+    /// Unless there is one recall per log.
+    #[must_use]
+    pub fn recalling(mut self, recalls: Vec<Recall>) -> Self {
+        assert_eq!(recalls.len(), self.logs.len(), "one recall per log");
+        self.logs.iter_mut().zip(recalls).for_each(|(log, recall)| log.states.recall = recall);
+        self
+    }
+
+    /// What elements remember of a log before a sample.
+    pub fn history_at(&self, log: usize, sample: usize) -> History {
+        let ConditionedLog { log, states, .. } = &self.logs[log];
+        states.history_at(sample, self.model, self.shape, &log.channels)
     }
 
     pub(super) fn of(

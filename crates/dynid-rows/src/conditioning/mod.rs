@@ -38,13 +38,13 @@ pub use log_rows::{LogRows, least_block_samples, most_blocks, time_blocks};
 pub use moving::{Moving, rms_speeds, tell_speeds};
 pub use predict::{predict, predict_along};
 pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, SharedMotion, prepare};
-pub use record_windows::{RecordFigures, Window};
+pub use record_windows::{RecordFigures, Window, WindowReach};
 pub use reduce::reduce;
 pub use repeated::{LogMotion, motions, parts_of_motions, tell_shared_motions};
 pub(crate) use rows::KeptColumns;
 pub use settings::{ConditioningSettings, FrictionSettings, Smoothing};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
-pub use states::{StateBlock, States};
+pub use states::{Recall, StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
 pub use trial::{prediction_hz_of, state_hz_of};
 

@@ -29,6 +29,18 @@ pub struct RecordFigures {
     speed_rms: Arc<Vec<Vec<f64>>>,
 }
 
+/// What rows of a window take from beyond it, samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WindowReach {
+    /// Half width of the widest kernel.
+    pub kernels: usize,
+    /// Samples on either side of a window that its rows go by: beyond them kernels (3.5 standard deviations), the delay, and what is left of the
+    /// state filter's start, less than 1e-16 of it, do not reach. A second of them belongs to spikes and to velocities that are means.
+    pub overlap: usize,
+    /// Windows begin at multiples of this, so that their rows are on the grid of the whole log's rows.
+    pub grid: usize,
+}
+
 /// Samples of a window, joints in the order of the outputs.
 #[derive(Debug, Clone, Default)]
 pub struct Window {
@@ -74,10 +86,7 @@ impl RecordFigures {
         &self.clock
     }
 
-    /// Samples on either side of a window that its rows go by: beyond them kernels (3.5 standard deviations), the delay, and what is left of the
-    /// state filter's start, less than 1e-16 of it, do not reach. A second of them belongs to spikes and to velocities that are means.
-    ///
-    /// Also the distance of samples at which windows may begin, so that their rows are on the grid of the whole log's rows.
+    /// Where windows of the log may lie.
     ///
     /// # Errors
     /// As [`dynid_motion::Kernel::new`].
@@ -87,14 +96,14 @@ impl RecordFigures {
         state_hz: f64,
         delay_samples: f64,
         settings: &ConditioningSettings,
-    ) -> Result<(usize, usize), ConditioningError> {
+    ) -> Result<WindowReach, ConditioningError> {
         let kernels = Kernels::of_rate(scales_hz, self.clock.rate_hz)?;
         let (reach, grid) = kernels.reach_and_grid();
         // The slowest pole of a Butterworth of order `n` decays at this rate.
         let decay = TAU * state_hz * (PI / (2.0 * settings.state_order.max(1) as f64)).sin();
         let seconds = -FORGOTTEN.ln() / decay + 1.0;
         let samples = (seconds * self.clock.rate_hz + delay_samples.abs()).ceil() as usize + SPIKE_REACH;
-        Ok((reach + samples, grid))
+        Ok(WindowReach { kernels: reach, overlap: reach + samples, grid })
     }
 }
 

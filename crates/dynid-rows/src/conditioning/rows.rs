@@ -6,7 +6,7 @@ use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
-use super::friction_shape::{FrictionShape, ShapeKind};
+use super::friction_shape::{FrictionShape, ShapeKind, SlipSpring};
 use super::masks::Masks;
 use super::states::States;
 use super::windows::add_windows;
@@ -165,6 +165,8 @@ struct Rows {
 struct Remembered {
     own: Vec<Channel>,
     instruments: Vec<Channel>,
+    /// Per output, friction shape and stretch: springs at its start.
+    springs: Vec<Vec<Vec<SlipSpring>>>,
 }
 
 impl Pass<'_> {
@@ -183,19 +185,25 @@ impl Pass<'_> {
                 .instruments
                 .map(|states| states.remembered(self.model, self.shape, &self.log.channels))
                 .unwrap_or_default(),
+            springs: self.springs(&stretches),
         };
         // Per output and scale: rows that the next stretch has a part of.
         let mut open: Vec<Vec<Rows>> = consumers.iter().map(|_| self.no_rows()).collect();
         let mut formed = Vec::new();
         // While rows are handed over, the next ones are formed.
-        let groups = stretches.chunks(PER_THREAD * rayon::current_num_threads());
+        let numbered: Vec<(usize, Range<usize>)> = stretches.into_iter().enumerate().collect();
+        let groups = numbered.chunks(PER_THREAD * rayon::current_num_threads());
         for group in groups.chain([&[][..]]) {
             let (next, handed) = rayon::join(
-                || group.par_iter().map(|part| self.rows(part.clone(), &remembered)).collect::<Vec<_>>(),
+                || {
+                    let rows =
+                        |(place, part): &(usize, Range<usize>)| self.rows(*place, part.clone(), &remembered);
+                    group.par_iter().map(rows).collect::<Vec<_>>()
+                },
                 || self.hand_over(std::mem::take(&mut formed), &mut open, consumers),
             );
             handed?;
-            formed = group.iter().map(|part| part.end).zip(next).collect();
+            formed = group.iter().map(|(_, part)| part.end).zip(next).collect();
         }
         Ok(())
     }
@@ -204,14 +212,45 @@ impl Pass<'_> {
         self.kernels.kernels.iter().map(|_| Rows::default()).collect()
     }
 
+    /// Per output, friction shape and stretch: springs at its start.
+    fn springs(&self, stretches: &[Range<usize>]) -> Vec<Vec<Vec<SlipSpring>>> {
+        let of_output = |(output, shapes): (usize, &Vec<FrictionShape>)| -> Vec<Vec<SlipSpring>> {
+            let positions = self.states.position(output);
+            let is_spring = |shape: &FrictionShape| shape.kind == ShapeKind::MaxwellSlip;
+            let speeds = match shapes.iter().any(is_spring) {
+                true => self.states.velocity(output),
+                false => Vec::new(),
+            };
+            let of_shape = |shape: &FrictionShape| -> Vec<SlipSpring> {
+                let mut spring = SlipSpring::default();
+                if let (true, Some(speed)) = (is_spring(shape), speeds.first()) {
+                    spring = SlipSpring::at(positions[0], *speed);
+                }
+                let at_start = |stretch: &Range<usize>| {
+                    let held = spring;
+                    if is_spring(shape) {
+                        let part = stretch.clone();
+                        shape.column(&positions[part.clone()], &speeds[part], &[], &mut spring);
+                    }
+                    held
+                };
+                stretches.iter().map(at_start).collect()
+            };
+            shapes.iter().map(of_shape).collect()
+        };
+        self.shapes.par_iter().enumerate().map(of_output).collect()
+    }
+
     /// Per output and scale: rows whose windows reach into a stretch of the log, with what it holds of them.
-    fn rows(&self, stretch: Range<usize>, remembered: &Remembered) -> Vec<Vec<Rows>> {
+    fn rows(&self, place: usize, stretch: Range<usize>, remembered: &Remembered) -> Vec<Vec<Rows>> {
         let layout = self.model.layout();
         let mut regressor = RegressorBlock::new(layout.clone(), PIECE.min(stretch.len()));
         let mut instruments = self.instruments.map(|_| regressor.clone());
         let outputs = 0..layout.outputs();
         let mut rows: Vec<Vec<Rows>> =
             outputs.clone().map(|output| self.empty_rows(output, &stretch)).collect();
+        let mut springs: Vec<Vec<SlipSpring>> =
+            remembered.springs.iter().map(|held| held.iter().map(|held| held[place]).collect()).collect();
         for start in stretch.clone().step_by(PIECE) {
             let piece = start..(start + PIECE).min(stretch.end);
             self.fill(self.states, piece.clone(), &remembered.own, &mut regressor);
@@ -219,8 +258,8 @@ impl Pass<'_> {
                 self.fill(states, piece.clone(), &remembered.instruments, block);
             }
             let blocks = (&regressor, instruments.as_ref());
-            for (output, rows) in outputs.clone().zip(&mut rows) {
-                self.add_columns(output, start, blocks, rows);
+            for ((output, rows), springs) in outputs.clone().zip(&mut rows).zip(&mut springs) {
+                self.add_columns(output, start, blocks, springs, rows);
             }
         }
         rows
@@ -260,6 +299,7 @@ impl Pass<'_> {
         output: usize,
         first: usize,
         (regressor, instruments): (&RegressorBlock, Option<&RegressorBlock>),
+        springs: &mut [SlipSpring],
         rows: &mut [Rows],
     ) {
         let speed = match self.shapes[output].is_empty() {
@@ -270,7 +310,10 @@ impl Pass<'_> {
             true => regressor.effort(output, self.load),
             false => Vec::new(),
         };
-        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(&speed, &loads)).collect();
+        let positions = &self.states.position(output)[first..first + regressor.samples()];
+        let shapes = self.shapes[output].iter().zip(springs);
+        let shaped: Vec<Vec<f64>> =
+            shapes.map(|(s, spring)| s.column(positions, &speed, &loads, spring)).collect();
         let local = &self.columns.local[output];
         let columns: Vec<&[f64]> = instruments
             .iter()

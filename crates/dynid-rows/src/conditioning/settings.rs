@@ -123,13 +123,16 @@ impl Default for ConditioningSettings {
 pub struct FrictionSettings {
     /// Share of the joint's held-out loss that its first shape must gain, less where the kind is expected. Default 0.01.
     pub first: f64,
+    /// The same share of friction that gives way, over all rows. A filtered velocity turns a little early or late, which a short travel imitates: on
+    /// logs without such friction up to 8 %. Default 0.1.
+    pub spring: f64,
     /// How much a kind of first shape is expected at a joint: of `m` other joints, `n` with the kind, the odds against it are
     /// `(m - n + a) / (b n + c)`, and the gain must be `sqrt(2 ln(odds))` standard errors over time blocks, at least 0.3.
     /// Default `a`, `b`, `c` = 1.5, 4, 0.2: 2.0 errors for a joint alone, 2.6 for the first of six, 0.7 for its neighbours.
     pub expected: (f64, f64, f64),
     /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
     pub second: (f64, f64),
-    /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
+    /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 6.
     pub tried: usize,
     /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
     pub least_blocks: usize,
@@ -142,9 +145,10 @@ impl Default for FrictionSettings {
     fn default() -> Self {
         FrictionSettings {
             first: 0.01,
+            spring: 0.1,
             expected: (1.5, 4.0, 0.2),
             second: (2.5, 0.03),
-            tried: 4,
+            tried: 6,
             least_blocks: 4,
             mask_again: (1.4, 0.005),
         }

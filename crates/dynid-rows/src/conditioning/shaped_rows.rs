@@ -22,6 +22,9 @@ const STRETCH: usize = 8192;
 /// Samples whose shaped columns are formed at a time.
 const PIECE: usize = 1024;
 
+/// Positions of logs up to which their motion is held between evaluations, 48 MiB of numbers.
+const MOST_HELD: usize = 1 << 21;
+
 /// Why shape parameters cannot be fitted to logs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -88,7 +91,11 @@ impl<'a> ShapedRows<'a> {
         choices: &Conditioning,
         settings: &ConditioningSettings,
     ) -> Result<Self, ConditioningError> {
-        let rows = LogRows::new(model, shape, kept, logs, choices, settings)?;
+        let mut rows = LogRows::new(model, shape, kept, logs, choices, settings)?;
+        let numbers: usize = rows.logs.iter().map(|log| log.states.samples * log.states.outputs()).sum();
+        if numbers <= MOST_HELD {
+            rows.logs.iter_mut().for_each(|log| log.states.hold());
+        }
         let places = places(model, kept);
         let mut keepers: Vec<Keeper> = rows
             .groups()

@@ -34,6 +34,19 @@ pub struct States {
     pub effort: Vec<Vec<f64>>,
     /// Per output: standard deviation of the velocity that comes from position noise.
     pub velocity_sigma: Vec<f64>,
+    /// What was before.
+    pub(super) recall: Recall,
+    /// All motion, where it is held for rows that are formed over and over.
+    held: Option<StateBlock>,
+}
+
+/// What elements remember of an earlier record before a sample of this one; by default the start of a record.
+#[derive(Debug, Clone, Default)]
+pub struct Recall {
+    /// The sample.
+    pub sample: usize,
+    /// What they remember before it.
+    pub history: History,
 }
 
 /// Motion of consecutive samples, output after output.
@@ -94,6 +107,8 @@ impl States {
             moves: None,
             effort: Vec::new(),
             velocity_sigma,
+            recall: Recall::default(),
+            held: None,
         })
     }
 
@@ -141,6 +156,8 @@ impl States {
             moves: None,
             effort: Vec::new(),
             velocity_sigma: vec![0.0; position.len()],
+            recall: self.recall.clone(),
+            held: None,
             ..*self
         })
     }
@@ -222,18 +239,45 @@ impl States {
         block
     }
 
-    /// Signals of a model that depend on the motion before, over the whole record. `channels`: whole channels of the log.
+    /// Holds all motion from now on, which takes three times the memory of the positions.
+    pub(super) fn hold(&mut self) {
+        self.held = Some(self.block(0..self.samples));
+    }
+
+    /// Signals of a model that depend on the motion before, over the whole record, from where it recalls what was before; zeros earlier.
+    /// `channels`: whole channels of the log.
     pub fn remembered(&self, model: &dyn EffortModel, shape: &[f64], channels: &[Channel]) -> Vec<Channel> {
-        let (names, n) = (model.signals(), self.samples);
-        if names.is_empty() || n == 0 {
+        let (names, n, from) = (model.signals(), self.samples, self.recall.sample);
+        if names.is_empty() || n <= from {
             return Vec::new();
         }
         let mut values = vec![0.0; names.len() * n];
-        self.with_block(0..n, channels, &[], |motion| {
-            model.remember(motion, 1.0 / self.rate_hz, shape, &mut History::default(), n, &mut values);
+        self.with_block(from..n, channels, &[], |motion| {
+            let mut history = self.recall.history.clone();
+            model.remember(motion, 1.0 / self.rate_hz, shape, &mut history, n, &mut values[from..]);
         });
         let signals = names.iter().zip(values.chunks_exact(n));
         signals.map(|(name, values)| Channel { name: name.clone(), values: values.to_vec() }).collect()
+    }
+
+    /// What elements remember before a sample that is not before the one that this record recalls.
+    pub(super) fn history_at(
+        &self,
+        sample: usize,
+        model: &dyn EffortModel,
+        shape: &[f64],
+        channels: &[Channel],
+    ) -> History {
+        let mut history = self.recall.history.clone();
+        let range = self.recall.sample..sample;
+        if !model.signals().is_empty() && !range.is_empty() {
+            let (stride, step) = (range.len(), 1.0 / self.rate_hz);
+            let mut values = vec![0.0; model.signals().len() * stride];
+            self.with_block(range, channels, &[], |motion| {
+                model.remember(motion, step, shape, &mut history, stride, &mut values);
+            });
+        }
+        history
     }
 
     /// A run of samples as a motion block. `channels`: whole channels of the log; `remembered`: signals of the model over the
@@ -247,9 +291,17 @@ impl States {
     ) -> T {
         let channels: Vec<(&str, &[f64])> =
             channels.iter().chain(remembered).map(|c| (c.name.as_str(), &c.values[range.clone()])).collect();
-        let block = self.block(range.clone());
-        let motion = MotionBlock::plain(range.len(), &block.q, &block.dq, &block.ddq);
-        work(&MotionBlock { channels: &channels, ..motion })
+        let formed;
+        let (block, stride, first) = match &self.held {
+            Some(all) => (all, self.samples, range.start),
+            None => {
+                formed = self.block(range.clone());
+                (&formed, range.len(), 0)
+            }
+        };
+        let [q, dq, ddq] = [&block.q, &block.dq, &block.ddq].map(|signal| signal.get(first..).unwrap_or(&[]));
+        let motion = MotionBlock::plain(range.len(), q, dq, ddq);
+        work(&MotionBlock { stride, channels: &channels, ..motion })
     }
 
     /// Least speed of every reversal speed of an output at a level of the mask, `max(stick_sigma σ_v, level rms(v))`

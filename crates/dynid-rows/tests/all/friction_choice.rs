@@ -9,8 +9,13 @@ use dynid_rows::conditioning::{
     prepare,
 };
 
-const ALL: [ShapeKind; 4] =
-    [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
+const ALL: [ShapeKind; 5] = [
+    ShapeKind::ViscousMagnitude,
+    ShapeKind::Stribeck,
+    ShapeKind::Tanh,
+    ShapeKind::Load,
+    ShapeKind::MaxwellSlip,
+];
 
 struct Case {
     model: RobotModel,
@@ -178,4 +183,34 @@ fn a_log_too_short_for_held_out_blocks_asks_for_nothing() {
     // The narrowest kernel (4 Hz) reaches 0.23 s to either side, a block is 0.375 s long: no row lies in one.
     assert!(found.per_output.iter().all(|c| c.blocks == 0 && c.accepted.is_empty() && c.rejected.is_empty()));
     assert_eq!(found.conditioning, case.choices);
+}
+
+/// Friction that gives way: a spring of 2 mrad in series with friction of `size` noise deviations.
+fn slips(size: f64, with: &[usize]) -> impl Fn(usize, f64, f64) -> f64 {
+    let springs = std::cell::RefCell::new([0.0_f64; JOINTS]);
+    move |joint, v, _| {
+        let spring = &mut springs.borrow_mut()[joint];
+        *spring = (*spring + v / RATE_HZ / 0.002).clamp(-1.0, 1.0);
+        if with.contains(&joint) { size * NOISE[joint] * *spring } else { 0.0 }
+    }
+}
+
+#[test]
+fn friction_that_gives_way_is_found_where_it_is() {
+    let with = [0, 3];
+    let case = Case::new(40.0, 5, None, slips(6.0, &with), |_| true);
+    let found = case.choose(&ALL);
+    for (joint, choice) in found.per_output.iter().enumerate() {
+        println!("joint {}: {choice:?}", joint + 1);
+        let springs: Vec<_> =
+            choice.accepted.iter().filter(|t| t.shape.kind == ShapeKind::MaxwellSlip).collect();
+        if !with.contains(&joint) {
+            assert!(springs.is_empty() && !choice.has_spring(), "joint {}: {springs:?}", joint + 1);
+            continue;
+        }
+        let [spring] = springs[..] else { panic!("joint {}: {:?}", joint + 1, choice.accepted) };
+        assert!((0.001..0.004).contains(&spring.shape.value), "{:?}", spring.shape);
+        assert!(spring.gain > 3.0 * spring.standard_error);
+        assert_eq!((found.conditioning.rung[joint], found.conditioning.mask[joint]), (0, None), "no mask");
+    }
 }

@@ -141,7 +141,7 @@ impl<'a> ClosedIntegrator<'a> {
     ) -> Result<(), SimError> {
         if state.history == History::default() {
             // A record starts at the steady state of its own velocity, not at that of a step's mean.
-            self.plant.elements().pass(&mut state.history, duration, &state.dq);
+            self.plant.elements().pass(&mut state.history, duration, (&state.q, &state.dq));
         }
         match self.stepping {
             Stepping::Controlled { .. } => self.controlled(state, (drive, channels), (time, duration)),

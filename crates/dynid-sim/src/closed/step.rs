@@ -18,7 +18,7 @@ impl ClosedIntegrator<'_> {
         (drive, channels): (&[f64], &[f64]),
     ) -> Result<(), ForwardError> {
         let (plant, work, start) = (self.plant, &mut self.work, &mut self.start);
-        let now = plant.elements().with_signals(channels, &state.history, None, &state.dq);
+        let now = plant.elements().with_signals(channels, &state.history, None, (&state.q, &state.dq));
         if plant.loads.joints.is_empty() {
             plant.machine.free_at(&mut work.free, &state.q);
             plant.reduce(&state.q, work)?;
@@ -55,8 +55,8 @@ impl ClosedIntegrator<'_> {
         let elements = self.plant.elements();
         let between = if elements.remember() { mean(&from.dq, &stage.dq) } else { Vec::new() };
         let step = (step > 0.0).then_some((step, between.as_slice()));
-        let channels = elements.with_signals(channels, &from.history, step, &stage.dq);
         let state = (&stage.q[..], &stage.dq[..]);
+        let channels = elements.with_signals(channels, &from.history, step, state);
         self.evaluations += 1;
         self.plant.acceleration(state, drive, &channels, &mut self.work, &mut self.acceleration)
     }
@@ -199,7 +199,7 @@ impl ClosedIntegrator<'_> {
         let next = &mut self.next;
         self.plant.settle(&mut next.q, &mut next.dq, &mut self.work)?;
         let between = mean(&from.dq, &next.dq);
-        self.plant.elements().pass(&mut next.history, h, &between);
+        self.plant.elements().pass(&mut next.history, h, (&next.q, &between));
         Ok(())
     }
 }

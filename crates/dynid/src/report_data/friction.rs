@@ -90,8 +90,8 @@ impl Shown<'_> {
             .map(|t| report::FrictionTrial {
                 joint: t.joint.clone(),
                 element: t.element.clone(),
-                speed: t.speed,
-                speed_unit: self.speed_unit(&t.joint).to_owned(),
+                value: t.value,
+                unit: t.unit.clone(),
                 gain_percent: Some(100.0 * t.gain),
                 standard_error_percent: Some(100.0 * t.standard_error),
                 accepted: t.accepted,

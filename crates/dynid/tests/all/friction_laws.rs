@@ -196,6 +196,7 @@ fn every_law_is_found_recorded_and_exported() {
             acceleration: log.clean[2].clone(),
             gravity: None,
             channels: Vec::new(),
+            time: None,
         };
         let model = read.effort_model(&bench.path("estimate.json"), Split::Consistent).unwrap();
         let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();

@@ -45,6 +45,7 @@ mod safe_designs;
 mod servo;
 mod settings;
 mod simulated_loops;
+mod slips;
 mod stiffness;
 mod support;
 mod ties;

@@ -99,6 +99,7 @@ fn an_own_law_goes_the_whole_way() {
         acceleration: log.clean[2].clone(),
         gravity: None,
         channels: Vec::new(),
+        time: None,
     };
     let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();
     let square = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
@@ -176,6 +177,7 @@ fn a_law_of_formulas_goes_the_whole_way_without_a_program() {
         acceleration: log.clean[2].clone(),
         gravity: None,
         channels: Vec::new(),
+        time: None,
     };
     let model = read.effort_model(&file, Split::Consistent).unwrap();
     let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();

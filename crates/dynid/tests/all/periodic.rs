@@ -45,6 +45,7 @@ fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &st
         acceleration,
         gravity: None,
         channels: Vec::new(),
+        time: None,
     };
     let expected = efforts(&id.model, &truth, &states).unwrap();
     let found = efforts(&id.model, id.unconstrained_values(), &states).unwrap();

@@ -55,7 +55,7 @@ fn with_a_row_more() -> Recording {
 
 /// Largest difference of the products of columns of all factors, in parts of the columns' norms.
 #[track_caller]
-fn apart(a: &ReducedLog, b: &ReducedLog) -> f64 {
+pub(crate) fn apart(a: &ReducedLog, b: &ReducedLog) -> f64 {
     assert_eq!(a.groups.len(), b.groups.len());
     let mut largest = 0.0_f64;
     for (a, b) in a.groups.iter().zip(&b.groups) {

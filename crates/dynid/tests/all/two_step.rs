@@ -354,6 +354,7 @@ fn an_estimate_predicts_with_the_known_friction() {
         acceleration: log.clean[2].clone(),
         gravity: None,
         channels: Vec::new(),
+        time: None,
     };
     let values = read.values(Split::Consistent);
     let missing = efforts(&model, &values, &states).unwrap_err();

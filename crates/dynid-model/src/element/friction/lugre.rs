@@ -1,6 +1,6 @@
 //! LuGre friction: bristles that bend before they slip.
 
-use super::{EFFORT, NUMBER, PER_ANGLE, VISCOUS};
+use super::{EFFORT, NUMBER, PER_ANGLE, VISCOUS, remembered};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::laws::falling;
 use crate::element::shape::{places, values};
@@ -108,13 +108,7 @@ impl LuGre {
         motion: &MotionBlock<'a>,
         index: usize,
     ) -> Option<&'a [f64]> {
-        let joint = joints[self.rate].name.as_str();
-        let is_it = |name: &str| {
-            let rest = name.strip_prefix(joint).and_then(|rest| rest.strip_prefix('.'));
-            rest == Some(SIGNALS[index])
-        };
-        let (_, values) = motion.channels.iter().find(|(name, _)| is_it(name))?;
-        Some(&values[..motion.samples])
+        remembered(&joints[self.rate], motion, SIGNALS[index])
     }
 }
 

@@ -99,8 +99,8 @@ pub struct Candidate {
     pub unless_shaped: bool,
     /// The element whose place it takes; none: it joins them.
     pub instead_of: Option<&'static str>,
-    /// Symbol of the shape parameter that is its speed.
-    pub speed: Option<&'static str>,
+    /// Symbol of the shape parameter that a search finds, if it has one.
+    pub value: Option<&'static str>,
 }
 
 /// Where and how an element is to stand.

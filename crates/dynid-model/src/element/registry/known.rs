@@ -3,7 +3,7 @@
 use super::kind::{Build, Candidate, ElementKind, OptionTerm, Placement};
 use crate::element::law::units::{NUMBER, PER_SPEED, STIFFNESS, VISCOUS};
 use crate::element::{
-    AtJoint, Cyclic, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, ReactionFriction,
+    AtJoint, Cyclic, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, MaxwellSlip, ReactionFriction,
     RotorInertia, Spring, Stribeck, VelocityLaw, balancer, laws,
 };
 
@@ -16,7 +16,15 @@ pub(super) fn kinds() -> Vec<ElementKind> {
     let mut out = linear();
     out.extend(others());
     out.extend(shaped());
-    out.extend([load(), exponential_viscous(), lugre(), stribeck_viscous(), external_load(), elastic()]);
+    out.extend([
+        load(),
+        exponential_viscous(),
+        lugre(),
+        maxwell_slip(),
+        stribeck_viscous(),
+        external_load(),
+        elastic(),
+    ]);
     out.push(reaction_friction());
     out
 }
@@ -122,7 +130,7 @@ fn shaped() -> Vec<ElementKind> {
         beside: &["coulomb"],
         unless_shaped: true,
         instead_of: Some("coulomb"),
-        speed: Some("vs"),
+        value: Some("vs"),
     };
     let tanh = ElementKind::law("tanh", laws::Tanh)
         .equation("ft tanh(q̇/w)")
@@ -135,13 +143,13 @@ fn shaped() -> Vec<ElementKind> {
         beside: &["coulomb", "viscous", "asymmetric"],
         unless_shaped: true,
         instead_of: None,
-        speed: Some("w"),
+        value: Some("w"),
     };
     let magnitude = ElementKind::law("viscous_magnitude", laws::ViscousMagnitude)
         .equation("fva abs(q̇)")
         .help("beside `viscous`, other coefficients forward and backward")
         .keys(&["coefficient"]);
-    let directed = Candidate { beside: &["viscous"], unless_shaped: false, instead_of: None, speed: None };
+    let directed = Candidate { beside: &["viscous"], unless_shaped: false, instead_of: None, value: None };
     let power = ElementKind::law("power", laws::Power)
         .equation("fp sign(q̇) abs(q̇)^p")
         .keys(&["coefficient"])
@@ -150,7 +158,7 @@ fn shaped() -> Vec<ElementKind> {
         beside: &["viscous"],
         unless_shaped: true,
         instead_of: Some("viscous"),
-        speed: Some("p"),
+        value: Some("p"),
     };
     vec![
         ElementKind { candidate: Some(falls), ..stribeck },
@@ -177,7 +185,7 @@ fn shaped() -> Vec<ElementKind> {
 
 fn load() -> ElementKind {
     let candidate =
-        Candidate { beside: &["coulomb", "stribeck"], unless_shaped: false, instead_of: None, speed: None };
+        Candidate { beside: &["coulomb", "stribeck"], unless_shaped: false, instead_of: None, value: None };
     ElementKind {
         linear: vec![LinearTerm::new("mu", NUMBER).at_least(0.0)],
         gives_way: true,
@@ -259,6 +267,24 @@ fn lugre() -> ElementKind {
     .excludes("stribeck_viscous", "both have a Stribeck speed `vs`")
     .excludes("asymmetric", "its bristles, once bent, are the sign")
     .alike("tanh", SLOW)
+}
+
+fn maxwell_slip() -> ElementKind {
+    let kind = of("maxwell_slip", &[MaxwellSlip::FRICTION], |p| {
+        Ok(Box::new(MaxwellSlip { rate: p.rate, travel: p.shape[0] }))
+    });
+    let gives = Candidate {
+        beside: &["coulomb", "stribeck", "asymmetric"],
+        unless_shaped: false,
+        instead_of: None,
+        value: Some("travel"),
+    };
+    ElementKind { shape: vec![MaxwellSlip::TRAVEL], friction: true, candidate: Some(gives), ..kind }
+        .equation("fm w, ẇ = q̇/travel, abs(w) ≤ 1")
+        .help("dry friction that gives way over `travel` after a reversal; beside `coulomb` or `stribeck`: [Motion before](#motion-before)")
+        .reference("Al-Bender et al. 2005")
+        .keys(&["friction"])
+        .excludes("lugre", "both remember the motion before as one friction")
 }
 
 fn stribeck_viscous() -> ElementKind {

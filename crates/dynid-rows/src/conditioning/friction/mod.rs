@@ -37,6 +37,13 @@ pub struct JointFriction {
     pub blocks: usize,
 }
 
+impl JointFriction {
+    /// Whether friction that gives way over a travel was taken.
+    pub fn has_spring(&self) -> bool {
+        self.accepted.iter().any(|t| t.shape.kind == ShapeKind::MaxwellSlip)
+    }
+}
+
 /// Friction shapes of all joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrictionChoice {
@@ -122,7 +129,9 @@ pub fn choose_friction(
         let first = choose::delay(&trial, &rung, &all, limits, settings, choices.delay.samples);
         progress(Stage::Mask);
         if settings.reversal_mask.is_none() {
-            rung = choose::masks_again(&trial, &rung, &all, first.samples, settings);
+            // What a spring says it says over reversals.
+            let held: Vec<bool> = per_output.iter().map(JointFriction::has_spring).collect();
+            rung = choose::masks_again(&trial, &rung, &all, &held, first.samples, settings);
         }
         progress(Stage::Delay);
         conditioning.delay = choose::delay(&trial, &rung, &all, limits, settings, first.samples);

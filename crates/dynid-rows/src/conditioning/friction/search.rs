@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dynid_linalg::Mat;
 use rayon::prelude::*;
 
-use super::losses::Losses;
+use super::losses::{Losses, RowsOf};
 use super::{JointFriction, ShapeTrial};
 use crate::conditioning::base_prior::BasePrior;
 use crate::conditioning::friction_shape::{FrictionShape, ShapeKind};
@@ -91,8 +91,8 @@ impl<'a> Search<'a> {
             for _ in 0..ROUNDS {
                 let before = self.fit.shapes.clone();
                 for output in 0..outputs {
-                    if self.fit.shapes[output].len() < shapes && self.worth_trying(output) {
-                        self.extend(output);
+                    if self.worth_trying(output) {
+                        self.extend(output, shapes);
                     }
                 }
                 if self.fit.shapes == before {
@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
     /// were tried. The bar is where a gain of so many standard errors, `exp(z²/2)` in likelihood, meets the odds against it.
     fn bar(&self, base: &Fit, output: usize, kind: ShapeKind) -> (f64, f64) {
         let friction = &self.settings.friction;
-        if !base.shapes[output].is_empty() {
+        if kind != ShapeKind::MaxwellSlip && self.curves(base, output) > 0 {
             return friction.second;
         }
         let outputs = 0..self.trial.outputs();
@@ -137,7 +137,14 @@ impl<'a> Search<'a> {
         let (a, b, c) = friction.expected;
         let odds = (others - with + a) / (b * with + c);
         let sigmas = (2.0 * odds.ln()).max(0.0).sqrt().max(LEAST_SIGMAS);
-        (sigmas, friction.first * (sigmas / FULL_SIGMAS).min(1.0))
+        let share = if kind == ShapeKind::MaxwellSlip { friction.spring } else { friction.first };
+        (sigmas, share * (sigmas / FULL_SIGMAS).min(1.0))
+    }
+
+    /// Shapes of an output over speed: all but springs.
+    fn curves(&self, fit: &Fit, output: usize) -> usize {
+        let library = &self.library[output];
+        fit.shapes[output].iter().filter(|s| library[**s].kind != ShapeKind::MaxwellSlip).count()
     }
 
     /// How many other outputs have a kind of shape.
@@ -150,7 +157,9 @@ impl<'a> Search<'a> {
     /// against it by a standard error.
     fn best(&self, base: &Fit, output: usize, from: &Losses, tried: Vec<Scored>) -> Option<Scored> {
         let kind = |t: &Scored| self.library[output][t.place].kind;
-        let passes = |t: &Scored| from.falls(&t.losses, self.bar(base, output, kind(t)));
+        let passes = |t: &Scored| {
+            from.falls(&t.losses, self.bar(base, output, kind(t)), self.judged_on(output, kind(t)))
+        };
         let mut passing: Vec<Scored> = tried.into_iter().filter(passes).collect();
         passing.sort_by(|a, b| a.losses.mean().total_cmp(&b.losses.mean()));
         let first = passing.first()?;
@@ -159,19 +168,32 @@ impl<'a> Search<'a> {
         let common = passing
             .iter()
             .enumerate()
-            .filter(|(_, t)| others(t) > own && !t.losses.falls(&first.losses, (1.0, 0.0)));
+            .filter(|(_, t)| others(t) > own && !t.losses.falls(&first.losses, (1.0, 0.0), RowsOf::Motion));
         let place = common.rev().max_by_key(|(_, t)| others(t)).map_or(0, |(place, _)| place);
         Some(passing.swap_remove(place))
     }
 
-    /// Adds the best candidate to an output if it passes.
-    fn extend(&mut self, output: usize) {
+    /// Rows that a kind must gain in.
+    fn judged_on(&self, output: usize, kind: ShapeKind) -> RowsOf {
+        match kind {
+            ShapeKind::MaxwellSlip => RowsOf::Reversals,
+            // Rows without a mask hold reversals, and of a joint that rests for long above all rest, where more friction at low speed is
+            // more error.
+            _ if self.trial.rests(output) => RowsOf::MotionAlone,
+            _ => RowsOf::Motion,
+        }
+    }
+
+    /// Adds the best candidate to an output if it passes; a spring alone where it has so many shapes over speed as it may.
+    fn extend(&mut self, output: usize, most: usize) {
         let base = self.with_low_speeds(output);
-        let (from, tried) = self.candidates(&base, output);
+        let (from, mut tried) = self.candidates(&base, output);
+        if self.curves(&base, output) >= most {
+            tried.retain(|t| self.library[output][t.place].kind == ShapeKind::MaxwellSlip);
+        }
         let best = self.best(&base, output, &from, tried);
         if let Some(best) = best {
-            self.fit = base;
-            self.fit.shapes[output].push(best.place);
+            self.fit = self.with(&base, output, best.place);
         }
     }
 
@@ -179,18 +201,20 @@ impl<'a> Search<'a> {
     fn replace(&mut self, output: usize, current: usize) {
         let mut base = self.fit.clone();
         base.shapes[output].retain(|s| *s != current);
+        base.rung[output] = self.rung_of(&base, output);
         let (from, mut tried) = self.candidates(&base, output);
         if !tried.iter().any(|t| t.place == current) {
             let variances = self.variances(&base);
-            let losses = self.losses(&with(&base, output, current), output, &variances);
+            let losses = self.losses(&self.with(&base, output, current), output, &variances);
             tried.push(Scored { place: current, losses });
         }
         let best = self.best(&base, output, &from, tried);
-        self.fit = base;
-        match best {
-            Some(best) => self.fit.shapes[output].push(best.place),
-            None if self.fit.shapes[output].is_empty() => self.fit.rung[output] = self.before[output],
-            None => {}
+        self.fit = match best {
+            Some(best) => self.with(&base, output, best.place),
+            None => base,
+        };
+        if self.fit.shapes[output].is_empty() {
+            self.fit.rung[output] = self.before[output];
         }
     }
 
@@ -201,7 +225,8 @@ impl<'a> Search<'a> {
             return JointFriction { blocks, ..JointFriction::default() };
         }
         let trial = |place: usize, from: &Losses, to: &Losses| {
-            let (gain, standard_error) = from.share_of_fall(to);
+            let rows = self.judged_on(output, self.library[output][place].kind);
+            let (gain, standard_error) = from.share_of_fall(to, rows);
             ShapeTrial { shape: self.library[output][place], gain, standard_error }
         };
         let chosen = self.with_low_speeds(output);
@@ -211,6 +236,7 @@ impl<'a> Search<'a> {
             .map(|place| {
                 let mut base = chosen.clone();
                 base.shapes[output].retain(|s| s != place);
+                base.rung[output] = self.rung_of(&base, output);
                 let variances = self.variances(&base);
                 trial(*place, &self.losses(&base, output, &variances), &from)
             })
@@ -230,7 +256,21 @@ impl<'a> Search<'a> {
     /// The present fit with low speeds of one output in its rows.
     fn with_low_speeds(&self, output: usize) -> Fit {
         let mut fit = self.fit.clone();
-        fit.rung[output] = self.lowest[output];
+        fit.rung[output] = self.rung_of(&fit, output);
+        fit
+    }
+
+    /// The rung of an output with shapes: low speeds, and with a spring reversals, which it is all about.
+    fn rung_of(&self, fit: &Fit, output: usize) -> usize {
+        let springs =
+            fit.shapes[output].iter().any(|s| self.library[output][*s].kind == ShapeKind::MaxwellSlip);
+        if springs { 0 } else { self.lowest[output] }
+    }
+
+    fn with(&self, base: &Fit, output: usize, place: usize) -> Fit {
+        let mut fit = base.clone();
+        fit.shapes[output].push(place);
+        fit.rung[output] = self.rung_of(&fit, output);
         fit
     }
 
@@ -255,7 +295,7 @@ impl<'a> Search<'a> {
             .into_iter()
             .map(|place| Scored {
                 place,
-                losses: self.losses(&with(base, output, place), output, &variances),
+                losses: self.losses(&self.with(base, output, place), output, &variances),
             })
             .collect();
         (from, tried)
@@ -263,9 +303,23 @@ impl<'a> Search<'a> {
 
     /// Fall of the weighted loss on all rows with each candidate of an output alone, the variances held.
     fn gains(&self, base: &Fit, output: usize, variances: &[f64]) -> Vec<(usize, f64)> {
+        let is_spring = |c: &usize| self.library[output][*c].kind == ShapeKind::MaxwellSlip;
+        let (springs, others): (Vec<usize>, Vec<usize>) =
+            (0..self.library[output].len()).partition(|c| is_spring(c));
+        let mut found = self.gains_of(&others, base, output, variances);
+        if !springs.is_empty() {
+            let mut over_reversals = base.clone();
+            over_reversals.rung[output] = 0;
+            found.extend(self.gains_of(&springs, &over_reversals, output, variances));
+        }
+        found
+    }
+
+    /// As [`Search::gains`], of some candidates.
+    fn gains_of(&self, among: &[usize], base: &Fit, output: usize, variances: &[f64]) -> Vec<(usize, f64)> {
         let library = &self.library[output];
         let present = &base.shapes[output];
-        let candidates: Vec<usize> = (0..library.len())
+        let candidates: Vec<usize> = (among.iter().copied())
             .filter(|c| !present.iter().any(|p| library[*p].kind.excludes(library[*c].kind)))
             .filter(|c| library[*c].kind != ShapeKind::Power || self.viscous[output].is_some())
             .collect();
@@ -273,7 +327,7 @@ impl<'a> Search<'a> {
             candidates.into_iter().partition(|c| library[*c].kind == ShapeKind::Power);
         let before = self.weighted_loss(base, variances);
         let mut found: Vec<(usize, f64)> = (replacing.into_par_iter())
-            .filter_map(|c| Some((c, before? - self.weighted_loss(&with(base, output, c), variances)?)))
+            .filter_map(|c| Some((c, before? - self.weighted_loss(&self.with(base, output, c), variances)?)))
             .filter(|(_, gain)| *gain > 0.0)
             .collect();
         let (mut groups, unknowns) = self.groups(base, None);
@@ -324,10 +378,7 @@ impl<'a> Search<'a> {
     /// Losses of an output: logarithm of the mean square residual in every time block, fitted without that block.
     fn losses(&self, fit: &Fit, output: usize, variances: &[f64]) -> Losses {
         let columns = self.columns(output, &fit.shapes[output]);
-        // Rows without a mask hold reversals, and of a joint that rests for long above all rest, where more friction at low speed is more error.
-        let lowest = self.lowest[output];
-        let unmasked = if self.trial.rests(output) { lowest } else { 0 };
-        let rungs = [lowest, unmasked].map(|rung| &self.sums[&(output, rung)].scored);
+        let rungs = [self.lowest[output], 0].map(|rung| &self.sums[&(output, rung)].scored);
         let per_block: Vec<[f64; 2]> = (0..rungs[0].len())
             .into_par_iter()
             .filter(|fold| rungs[0][*fold].rows > 0.0)
@@ -395,10 +446,4 @@ impl<'a> Search<'a> {
         }
         (groups, unknowns)
     }
-}
-
-fn with(base: &Fit, output: usize, place: usize) -> Fit {
-    let mut fit = base.clone();
-    fit.shapes[output].push(place);
-    fit
 }
