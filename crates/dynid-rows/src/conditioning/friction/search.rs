@@ -260,11 +260,12 @@ impl<'a> Search<'a> {
         fit
     }
 
-    /// The rung of an output with shapes: low speeds, and with a spring reversals, which it is all about.
+    /// The rung of an output with shapes: low speeds, and with a spring reversals, which it is all about. Of a joint that rests for long those rows are
+    /// rest above all, where friction has any value left from before: a fit with them would be worse where the joint moves.
     fn rung_of(&self, fit: &Fit, output: usize) -> usize {
         let springs =
             fit.shapes[output].iter().any(|s| self.library[output][*s].kind == ShapeKind::MaxwellSlip);
-        if springs { 0 } else { self.lowest[output] }
+        if springs && !self.trial.rests(output) { 0 } else { self.lowest[output] }
     }
 
     fn with(&self, base: &Fit, output: usize, place: usize) -> Fit {
