@@ -36,9 +36,9 @@ pub use external_load::{ExternalLoad, load_channel};
 pub use formula::{FormulaFault, FormulaLaw, FormulaLawFault, FormulaTerms, RESERVED, kept};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, JournalFriction,
-    LoadFriction, LuGre, MaxwellSlip, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck,
-    StribeckViscous, TanhFriction, Viscous, ViscousMagnitude, journal_moment_channel, reaction_channel,
-    weight_channel,
+    LoadFriction, LuGre, MaxwellSlip, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, SlipSpring,
+    Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude, journal_moment_channel,
+    reaction_channel, weight_channel,
 };
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;

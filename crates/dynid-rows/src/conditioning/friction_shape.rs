@@ -1,6 +1,6 @@
 //! Shapes of friction, and the candidates for a joint.
 
-use dynid_model::element::{MaxwellSlip, Velocity, VelocityLaw as _, laws, sign};
+use dynid_model::element::{SlipSpring, Velocity, VelocityLaw as _, laws, sign};
 
 use super::states::States;
 
@@ -17,7 +17,7 @@ pub enum ShapeKind {
     Power,
     /// `|τ| s(v)` with the rigid effort `τ` of an earlier fit: friction of loaded gears.
     Load,
-    /// [`MaxwellSlip`]: friction that gives way over a travel after a reversal.
+    /// [`MaxwellSlip`](dynid_model::element::MaxwellSlip): friction that gives way over a travel after a reversal.
     MaxwellSlip,
 }
 
@@ -90,32 +90,13 @@ impl FrictionShape {
             ShapeKind::Power => velocities.map(|v| laws::Power.columns(v, [self.value])[0]).collect(),
             ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
             ShapeKind::MaxwellSlip => {
-                positions.iter().zip(speeds).map(|(q, v)| spring.moved_to(*q, *v, self.value)).collect()
+                let after = |(q, v): (&f64, &f64)| {
+                    spring.move_to(*q, *v, self.value);
+                    spring.w()
+                };
+                positions.iter().zip(speeds).map(after).collect()
             }
         }
-    }
-}
-
-/// What friction that gives way remembers of the motion.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct SlipSpring {
-    /// Its effort in parts of that at which it slips.
-    bent: f64,
-    position: f64,
-}
-
-impl SlipSpring {
-    /// At the start of a record.
-    pub(crate) fn at(position: f64, speed: f64) -> Self {
-        SlipSpring { bent: sign(speed), position }
-    }
-
-    fn moved_to(&mut self, position: f64, speed: f64, travel: f64) -> f64 {
-        if speed != 0.0 {
-            self.bent = MaxwellSlip::after(self.bent, (position - self.position) / travel);
-        }
-        self.position = position;
-        self.bent
     }
 }
 

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use dynid_model::element::SlipSpring;
 use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
-use super::friction_shape::{FrictionShape, ShapeKind, SlipSpring};
+use super::friction_shape::{FrictionShape, ShapeKind};
 use super::masks::Masks;
 use super::states::States;
 use super::windows::add_windows;

@@ -43,11 +43,33 @@ impl MaxwellSlip {
     pub fn new(rate: usize) -> Self {
         MaxwellSlip { rate, travel: Self::TRAVEL.setting(1.0) }
     }
+}
 
-    /// `w` after a displacement of the joint in one direction, in parts of the travel.
+/// What a [`MaxwellSlip`] remembers of the motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SlipSpring {
+    w: f64,
+    position: f64,
+}
+
+impl SlipSpring {
+    /// At the start of a record, at a position (rad or m) and a speed (rad/s or m/s).
+    pub fn at(position: f64, speed: f64) -> Self {
+        SlipSpring { w: sign(speed), position }
+    }
+
+    /// Takes it to the next sample and gives the displacement that counts, in parts of `travel` (rad or m): none at speed 0, where the joint stands.
     #[inline]
-    pub fn after(w: f64, displacement: f64) -> f64 {
-        (w + displacement).clamp(-1.0, 1.0)
+    pub fn move_to(&mut self, position: f64, speed: f64, travel: f64) -> f64 {
+        let moved = if speed == 0.0 { 0.0 } else { (position - self.position) / travel };
+        self.w = (self.w + moved).clamp(-1.0, 1.0);
+        self.position = position;
+        moved
+    }
+
+    /// `w`, between -1 and 1.
+    pub fn w(&self) -> f64 {
+        self.w
     }
 }
 
@@ -89,20 +111,20 @@ impl JointElement for MaxwellSlip {
         if state.is_empty() {
             state.extend([sign(*speed), *start, 0.0]);
         }
-        let [mut w, mut before, mut by_travel] = [state[0], state[1], state[2]];
+        let mut spring = SlipSpring { w: state[0], position: state[1] };
+        let mut by_travel = state[2];
         for (k, (position, speed)) in positions.iter().zip(speeds).enumerate() {
+            let moved = spring.move_to(*position, *speed, travel);
+            // A joint that stands leaves the derivative, slipping or not.
             if *speed != 0.0 {
-                let gain = (position - before) / travel;
-                w = Self::after(w, gain);
-                by_travel = if w.abs() < 1.0 { by_travel - gain / travel } else { 0.0 };
+                by_travel = if spring.w.abs() < 1.0 { by_travel - moved / travel } else { 0.0 };
             }
-            before = *position;
-            out[0][k] = w;
+            out[0][k] = spring.w;
             if let Some(derivative) = out.get_mut(1) {
                 derivative[k] = by_travel;
             }
         }
-        state.copy_from_slice(&[w, before, by_travel]);
+        state.copy_from_slice(&[spring.w, spring.position, by_travel]);
     }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         match remembered(&joints[self.rate], motion, Self::SPRING) {

@@ -10,7 +10,7 @@ mod reaction;
 pub use journal::{JournalFriction, journal_moment_channel};
 pub use load::LoadFriction;
 pub use lugre::LuGre;
-pub use maxwell_slip::MaxwellSlip;
+pub use maxwell_slip::{MaxwellSlip, SlipSpring};
 pub use placed::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, Offset, PowerLaw, Sigmoid, SigmoidOffset,
     Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
