@@ -90,9 +90,15 @@ fn share(plan: &ElementPlan, joints: &[&str], chosen: &mut [JointFriction]) {
     }
 }
 
-/// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
-/// `fc`); tells whether there were any.
-pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut [JointFriction]) -> bool {
+/// Drops chosen shapes whose shape parameter the logs do not see after all, falls from rest that came out as rises (`fs` below
+/// `fc`) and springs that would drive the joint (`fm` below zero), whose joint has its mask over reversals again. Tells
+/// whether there were any.
+pub(super) fn drop_refuted(
+    problem: &mut Problem,
+    found: &ShapeFit,
+    chosen: &mut [JointFriction],
+    choices: &mut Conditioning,
+) -> bool {
     let (model, plan) = (&found.model, &mut problem.plan);
     let table = model.parameters();
     let unseen = |joint: &str, trial: &ShapeTrial| {
@@ -124,6 +130,11 @@ pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut
             plan.remove_shape(model.tree_rate(rate), &output.name, &trial.shape);
             joint.rejected.push(trial);
             dropped = true;
+        }
+        if !joint.has_spring()
+            && let Some(mask) = joint.mask_without_spring.take()
+        {
+            choices.set_mask(rate, mask);
         }
     }
     dropped

@@ -66,7 +66,7 @@ pub(super) fn search(
     while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
         let found = shape::find(problem, choices, &start)?;
-        if friction::drop_refuted(problem, &found, &mut out.friction) {
+        if friction::drop_refuted(problem, &found, &mut out.friction, choices) {
             problem.rebuild()?;
             start = of_chosen(problem, &out.friction);
             continue;

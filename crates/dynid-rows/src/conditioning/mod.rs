@@ -199,6 +199,31 @@ pub struct Conditioning {
     pub mask_trials: Vec<MaskTrial>,
 }
 
+/// Rows about reversals that one joint leaves out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointMask {
+    /// Rung of the mask ladder, 0 = no mask.
+    pub rung: usize,
+    /// Mask as a share of the rms speed; `None` = no mask.
+    pub level: Option<f64>,
+    /// Share of samples that stay usable.
+    pub usable: f64,
+}
+
+impl Conditioning {
+    /// The mask of an output.
+    pub fn mask_of(&self, output: usize) -> JointMask {
+        JointMask { rung: self.rung[output], level: self.mask[output], usable: self.usable[output] }
+    }
+
+    /// Gives an output another mask.
+    pub fn set_mask(&mut self, output: usize, mask: JointMask) {
+        self.rung[output] = mask.rung;
+        self.mask[output] = mask.level;
+        self.usable[output] = mask.usable;
+    }
+}
+
 /// A step of the work, for progress displays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stage {

@@ -10,7 +10,7 @@ use super::base_prior::BasePrior;
 use super::friction_shape::{self, FrictionShape, ShapeKind};
 use super::states::States;
 use super::trial::{Trial, TrialShapes, state_hz_of};
-use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog, Stage, choose};
+use super::{Conditioning, ConditioningError, ConditioningSettings, JointMask, PreparedLog, Stage, choose};
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
 use search::Search;
 
@@ -35,6 +35,9 @@ pub struct JointFriction {
     pub rejected: Vec<ShapeTrial>,
     /// Time blocks with rows that the choice rests on. Below [`super::FrictionSettings::least_blocks`] nothing was tried.
     pub blocks: usize,
+    /// The mask before friction that gives way was taken, which needs the rows over reversals. Who drops that friction again
+    /// gives the joint this mask back.
+    pub mask_without_spring: Option<JointMask>,
 }
 
 impl JointFriction {
@@ -119,7 +122,10 @@ pub fn choose_friction(
     )?;
     let viscous = viscous_columns(model, kept, &trial);
     let mut search = Search::new(&trial, &library, &viscous, prior, choices, settings);
-    let per_output = search.run();
+    let mut per_output = search.run();
+    for (output, joint) in per_output.iter_mut().enumerate().filter(|(_, joint)| joint.has_spring()) {
+        joint.mask_without_spring = Some(choices.mask_of(output));
+    }
     let (mut rung, chosen) = search.into_parts();
     let mut conditioning = choices.clone();
     if chosen.iter().any(|c| !c.is_empty()) {

@@ -250,7 +250,7 @@ impl<'a> Search<'a> {
                 None => rejected.push(candidate),
             }
         }
-        JointFriction { accepted, rejected, blocks }
+        JointFriction { accepted, rejected, blocks, mask_without_spring: None }
     }
 
     /// The present fit with low speeds of one output in its rows.
