@@ -35,6 +35,7 @@ mod identified;
 mod joints;
 mod json;
 mod judged;
+mod links;
 mod projection;
 mod read_back;
 
@@ -47,13 +48,13 @@ use dynid_robots::urdf::{self, JointDynamics};
 /// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
 pub const READ_BACK_LIMIT: f64 = 1e-9;
 
-use bodies::Shares;
 pub use error::{ExportError, LinkFault};
 use identified::inertias;
 pub use identified::{Identified, IdentifiedRobot, Source};
 use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
 pub use judged::exported;
+pub use links::LinkInertias;
 pub use projection::FrictionProjection;
 pub use read_back::CheckStates;
 pub use read_back::with_slipping_bristles;
@@ -100,10 +101,6 @@ impl<'a> RobotExport<'a> {
         let other = |fault: String| ExportError::OtherRobot { file: file.clone(), fault };
         let held = held_joints(&description, identified.description).map_err(other)?;
 
-        let mut still = description.clone();
-        let named = |source| Error::Mechanism { file: file.clone(), source };
-        still.lock(&held).map_err(named)?;
-        let target = still.build().map_err(named)?;
         let all = inertias(identified.values).collect::<Vec<_>>();
         // Where sensors measure all loads, no body was identified.
         let measured = mechanism.bodies().is_empty();
@@ -122,23 +119,9 @@ impl<'a> RobotExport<'a> {
                 projected,
             });
         }
-        let shared = target
-            .bodies()
-            .iter()
-            .map(|body| {
-                let found = mechanism.bodies().iter().position(|b| b.joint.name == body.joint.name);
-                let same = found.filter(|b| mechanism.bodies()[*b].name == body.name);
-                same.map(|b| all[b])
-                    .ok_or_else(|| other(format!("joint `{}` was not identified", body.joint.name)))
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        if let Some(missing) = mechanism.bodies().iter().find(|b| target.joint_index(&b.joint.name).is_err())
-        {
-            return Err(other(format!("it has no moving joint `{}`", missing.joint.name)).into());
-        }
-        let Shares { links, mut faults, notes } = bodies::share(&target, &still, &held, &shared);
-        // MJCF has several joints in one body, and no link between them.
-        faults.retain(|fault| !source.is_between(&fault.link));
+        let bodies = (mechanism, all.as_slice());
+        let LinkInertias { links, faults, notes } =
+            LinkInertias::shared(source, &description, &held, bodies)?;
         for (name, inertia) in &links {
             if let Some(link) = description.links.iter_mut().find(|l| l.name == *name) {
                 link.inertia = Some(*inertia);
