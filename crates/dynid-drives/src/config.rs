@@ -9,7 +9,9 @@ use dynid_identify::robot::Robot;
 use dynid_identify::settings::PerJoint;
 use dynid_logs::MappingSpec;
 use dynid_logs::columns::SignalSpec;
-use dynid_servo::{Addition, Channel, Choice, EffortAt, Hold, Limited, LoadOf, ServoSettings, Shared, Term};
+use dynid_servo::{
+    Addition, Bodies, Channel, Choice, EffortAt, Hold, Limited, LoadOf, ServoSettings, Shared, Term,
+};
 use serde::{Deserialize, Serialize};
 
 /// A robot, its logs of commands and positions, and what is known of its drives. Every key but `robot` and `log` has a default.
@@ -136,6 +138,11 @@ pub struct DriveConfig {
     /// What is added to rotor inertia, viscous and Coulomb friction: `offset`, `stiction`, `load_friction`, `zero`. Default: what held-out
     /// data ask for.
     pub law: Option<Vec<LawName>>,
+    /// Where masses, centres and moments of inertia of the links come from. Default `file`.
+    pub bodies: BodiesName,
+    /// Relative error that masses of the robot file may have, 95 %, beside `bodies = "found"`. Default 0.5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_error: Option<f64>,
     /// Terms that are found besides, one per joint: `dead_band`, `rate_limit`, `smoothing_time`, `effort_limit`. Default: none.
     pub find: Vec<FoundName>,
     /// What load friction grows with. Default `drive`.
@@ -167,6 +174,8 @@ impl Default for DriveConfig {
             delays: DelaySharing::Chain,
             hold: HoldName::Held,
             law: None,
+            bodies: BodiesName::File,
+            body_error: None,
             find: Vec::new(),
             load: LoadName::Drive,
             step_s: None,
@@ -258,6 +267,17 @@ pub enum LawName {
     Zero,
 }
 
+/// Where the inertias of links come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodiesName {
+    /// They are those of the robot file.
+    #[default]
+    File,
+    /// They deviate from those of the robot file as far as held-out data ask for it.
+    Found,
+}
+
 /// Terms that are found on request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -286,6 +306,9 @@ pub enum LoadName {
 /// Starts of terms that are found: any value whose slope is not zero.
 const FIRST_DEAD_BAND: f64 = 2e-3;
 const FIRST_SMOOTHING: f64 = 5e-3;
+
+/// Relative error of masses, 95 %, from which a robot file says nothing.
+const MOST_BODY_ERROR: f64 = 2.0;
 
 impl ServoConfig {
     /// Reads a configuration; paths in it become relative to its folder.
@@ -376,6 +399,15 @@ impl DriveConfig {
         for (name, x) in positive {
             if !(x.is_finite() && x > 0.0) {
                 return Err(Error::setting(name, "a positive number", x));
+            }
+        }
+        if let Some(error) = s.body_error {
+            if !(error > 0.0 && error < MOST_BODY_ERROR) {
+                let expected = format!("a positive number below {MOST_BODY_ERROR}");
+                return Err(Error::setting("servo.body_error", &expected, error));
+            }
+            if s.bodies == BodiesName::File {
+                return Err(Error::setting("servo.body_error", "`bodies = \"found\"` beside it", "`file`"));
             }
         }
         if !(4..=1000).contains(&s.blocks) {
@@ -487,6 +519,13 @@ impl DriveConfig {
             LoadName::Drive => LoadOf::Drive,
             LoadName::Bodies => LoadOf::Bodies,
         };
+        out.bodies = match s.bodies {
+            BodiesName::File => Bodies::File,
+            BodiesName::Found => Bodies::Found,
+        };
+        if let Some(error) = s.body_error {
+            out.body_error = error;
+        }
         out.step_s = s.step_s;
         out.blocks = s.blocks;
         Ok(out)

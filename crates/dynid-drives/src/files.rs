@@ -3,10 +3,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dynid_export::Source;
+use dynid_export::{LinkInertias, Source};
 use dynid_files::FileMember;
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
+use dynid_model::Inertia;
 use dynid_robots::mjcf::{self, JointParameters};
 use dynid_robots::robot;
 use dynid_robots::urdf::{self, JointDynamics};
@@ -69,7 +70,7 @@ impl ServoResult {
     ///
     /// | file | what |
     /// |---|---|
-    /// | `NAME.urdf`, `NAME.xml` (MJCF) | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, else byte for byte |
+    /// | `NAME.urdf`, `NAME.xml` (MJCF) | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, inertias where they were found, else byte for byte |
     /// | `NAME.mujoco.xml` | for robots that are no MJCF: the robot in MJCF with its actuators |
     /// | `actuators.xml` | MJCF `<actuator>`: one affine actuator per joint, for `<include>` |
     /// | `actuators.json` | stiffness, damping, armature, friction, limits, delay, zero and direction by joint, for simulators of many robots |
@@ -94,13 +95,14 @@ impl ServoResult {
                 ..spring(name)
             })
             .collect();
+        let (links, mut notes) = self.links(&source)?;
         let mut files = Vec::new();
         let own = FileMember::of(&self.robot.path).path;
         let name = own.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let stem = robot::stem(&self.robot.path);
         let actuators = self.actuators_xml(&names);
         if let Some(text) = source.mjcf_text() {
-            let mut edited = mjcf::edit(text, &own, &[], &joints)?;
+            let mut edited = mjcf::edit(text, &own, &links, &joints)?;
             files.push((format!("{stem}.xml"), edited.remove(0).text));
             let folder = own.parent().unwrap_or(Path::new(""));
             for included in source.included() {
@@ -124,16 +126,39 @@ impl ServoResult {
                         friction: p.friction_loss,
                     })
                     .collect();
-                files.push((format!("{stem}.urdf"), urdf::edit(text, &name, &[], &dynamics)?));
+                let links: Vec<(String, Option<Inertia>)> =
+                    links.iter().map(|(link, inertia)| (link.clone(), Some(*inertia))).collect();
+                files.push((format!("{stem}.urdf"), urdf::edit(text, &name, &links, &dynamics)?));
             }
-            let text = mjcf::from_description(source.description(), &joints)?;
+            let mut description = source.description().clone();
+            for (name, inertia) in &links {
+                let link = description.links.iter_mut().find(|l| l.name == *name);
+                link.into_iter().for_each(|l| l.inertia = Some(*inertia));
+            }
+            let text = mjcf::from_description(&description, &joints)?;
             files.push((format!("{stem}.mujoco.xml"), with_actuators(&text, &actuators, &names)));
         }
         files.push(("actuators.xml".to_owned(), format!("<mujoco>\n{actuators}</mujoco>\n")));
         let table = serde_json::to_string_pretty(&self.table(&names)).unwrap_or_default();
         files.push(("actuators.json".to_owned(), table + "\n"));
         files.push(("actuators.h".to_owned(), self.header(&names)));
-        Ok(ServoFiles { files, notes: self.left_out(&names) })
+        notes.extend(self.left_out(&names));
+        Ok(ServoFiles { files, notes })
+    }
+
+    /// Links whose inertia was found, and notes in words.
+    fn links(&self, source: &Source) -> Result<(Vec<(String, Inertia)>, Vec<String>), Error> {
+        if self.found.bodies.is_empty() {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let mechanism = &self.robot.mechanism;
+        let bodies: Vec<Inertia> = (0..mechanism.bodies().len()).map(|b| self.found.values.body(b)).collect();
+        let LinkInertias { links, faults, mut notes } =
+            LinkInertias::of(source, mechanism, &self.robot.file.description, &bodies)?;
+        notes.extend(
+            faults.iter().map(|f| format!("link `{}` of the files is no possible body: {}", f.link, f.fault)),
+        );
+        Ok((links, notes))
     }
 
     /// What damping, friction loss, armature and affine actuators cannot say.

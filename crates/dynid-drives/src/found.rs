@@ -8,7 +8,7 @@ use dynid_identify::robot::Robot;
 use dynid_servo::{ServoJoint, ServoSettings, Term};
 
 use super::record::{ServoFile, Told};
-use super::{Error, clamped};
+use super::{Error, ServoFault, clamped};
 
 /// A robot, and what was found of its drives.
 pub struct FoundDrives {
@@ -50,6 +50,7 @@ impl FoundDrives {
             let expected = format!("a robot with the joints of {}: {}", source.path, file.joints.join(", "));
             return Err(Error::setting("drives", &expected, robot.rate_names().join(", ")));
         }
+        let robot = with_bodies(robot, &file, &source.path)?;
         Ok(FoundDrives { robot, file, told, source, warnings })
     }
 
@@ -68,6 +69,26 @@ impl FoundDrives {
         }
         Ok(settings)
     }
+}
+
+/// The robot with the bodies that were found.
+fn with_bodies(mut robot: Robot, file: &ServoFile, path: &str) -> Result<Robot, Error> {
+    if file.bodies.is_empty() {
+        return Ok(robot);
+    }
+    let inertia = |body: &dynid_model::Body| {
+        let found = file.bodies.iter().find(|b| b.link == body.name).ok_or_else(|| {
+            let expected = format!("a robot with the bodies of {path}");
+            Error::setting("drives", &expected, format!("`{}` is none of them", body.name))
+        })?;
+        found.inertia().filter(|i| i.physical_fault().is_none()).ok_or_else(|| {
+            let message = format!("bodies: expected the ten parameters of a body for `{}`", body.name);
+            ServoFault::File { file: path.to_owned(), message }.into()
+        })
+    };
+    let inertias = robot.mechanism.bodies().iter().map(inertia).collect::<Result<Vec<_>, Error>>()?;
+    robot.mechanism = robot.mechanism.with_inertias(&inertias);
+    Ok(robot)
 }
 
 /// Sets terms by name, `JOINT.TERM`.

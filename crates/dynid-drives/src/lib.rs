@@ -16,9 +16,9 @@ pub use files::stated;
 pub use found::{FoundDrives, set_terms};
 pub use record::member;
 pub use record::{
-    AdditionRecord, DirectionRecord, HorizonRecord, ServoEffortRecord, ServoEffortVerdict, ServoFile,
-    ServoFit, ServoGroupKind, ServoGroupRecord, ServoLaw, ServoLogFit, ServoParameterRecord, ServoSimulation,
-    ServoSpread, ServoVerdict,
+    AdditionRecord, BodyParameterRecord, BodyTrialRecord, DirectionRecord, HorizonRecord, ServoBodyRecord,
+    ServoEffortRecord, ServoEffortVerdict, ServoFile, ServoFit, ServoGroupKind, ServoGroupRecord, ServoLaw,
+    ServoLogFit, ServoParameterRecord, ServoSimulation, ServoSpread, ServoVerdict,
 };
 
 use std::collections::BTreeMap;

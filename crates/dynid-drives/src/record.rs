@@ -6,9 +6,13 @@ use std::path::Path;
 use dynid_files::SourceFile;
 use dynid_identify::Error;
 use dynid_identify::estimate::{Provenance, SCHEMA};
+use dynid_model::Inertia;
+use dynid_model::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
 use dynid_record::{Outcome, words};
 use dynid_servo::fit::Ending;
-use dynid_servo::identify::{EffortUse, GroupKind, MISFIT, ServoGroup, ServoParameter, TOLD_DIRECTION};
+use dynid_servo::identify::{
+    EffortUse, GroupKind, MISFIT, ServoBody, ServoGroup, ServoParameter, TOLD_DIRECTION,
+};
 use dynid_servo::{Addition, Channel, Free, Hold, LoadOf, Term};
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +85,9 @@ pub struct ServoFile {
     pub joints: Vec<String>,
     /// Parameters that were found.
     pub parameters: Vec<ServoParameterRecord>,
+    /// Bodies that were found; empty where they are those of the robot file.
+    #[serde(default)]
+    pub bodies: Vec<ServoBodyRecord>,
     /// Parameters that are known together only.
     pub groups: Vec<ServoGroupRecord>,
     /// The law.
@@ -137,6 +144,46 @@ pub struct ServoSpread {
     /// Change with the time over which efforts are read, a period or an instant, where the logs do not tell it.
     #[serde(default)]
     pub reading: f64,
+    /// Standard deviation by what is known beforehand (zeros, gains, bodies), which may be off by its own.
+    #[serde(default)]
+    pub knowledge: f64,
+}
+
+/// A body that was found: a moving link and all that is welded to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoBodyRecord {
+    /// Link.
+    pub link: String,
+    /// Its ten parameters about the joint frame: `m`, `mx`, `my`, `mz`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`. Together they are a body that can exist.
+    pub parameters: Vec<BodyParameterRecord>,
+}
+
+/// A parameter of a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct BodyParameterRecord {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// What the robot file states, repaired if no body can have that.
+    pub file: f64,
+    /// What was found.
+    pub value: f64,
+    /// 95 % interval, with what the robot file may be off by; absent where there is none.
+    pub interval: Option<(f64, f64)>,
+    /// Whether the logs tell it: the interval is a third of what the robot file's error leaves, or less. What they do not tell follows the robot file.
+    pub told: bool,
+}
+
+/// Bodies that were left free with one pull towards the robot file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct BodyTrialRecord {
+    /// Factor by which the robot file was taken for surer than `body_error` says.
+    pub pull: f64,
+    /// Held-out error over that with the bodies of the robot file, by fold; `null`: the simulation got lost.
+    pub ratios: Vec<Option<f64>>,
+    /// Whether it was taken.
+    pub taken: bool,
 }
 
 /// Parameters that are known together only.
@@ -157,6 +204,9 @@ pub struct ServoLaw {
     pub additions: Vec<String>,
     /// Additions that were tried on held-out folds.
     pub trials: Vec<AdditionRecord>,
+    /// Pulls towards the robot file that were tried where bodies were to be found.
+    #[serde(default)]
+    pub bodies: Vec<BodyTrialRecord>,
     /// Directions that were looked for.
     pub directions: Vec<DirectionRecord>,
 }
@@ -363,6 +413,7 @@ impl ServoResult {
             groups: f.groups.iter().map(|g| ServoGroupRecord::of(g, &free, &names)).collect(),
             joints: names,
             parameters,
+            bodies: f.bodies.iter().map(|b| self.body(b)).collect(),
             law: ServoLaw {
                 additions: words_of(&f.additions),
                 trials: f
@@ -374,6 +425,11 @@ impl ServoResult {
                         ratios: finite(&t.ratios),
                         taken: t.taken,
                     })
+                    .collect(),
+                bodies: f
+                    .body_trials
+                    .iter()
+                    .map(|t| BodyTrialRecord { pull: t.pull, ratios: finite(&t.ratios), taken: t.taken })
                     .collect(),
                 directions: f
                     .directions
@@ -449,6 +505,7 @@ impl ServoResult {
                 folds: p.spread.folds,
                 gain: p.spread.gain,
                 reading: p.spread.reading,
+                knowledge: p.spread.knowledge,
             },
             per_gain: p.per_gain,
             verdict: match p.verdict {
@@ -459,6 +516,25 @@ impl ServoResult {
                 V::AtBound => ServoVerdict::AtBound,
                 V::NotSeen => ServoVerdict::NotSeen,
             },
+        }
+    }
+
+    fn body(&self, body: &ServoBody) -> ServoBodyRecord {
+        let parameter = |k: usize| BodyParameterRecord {
+            name: PARAMETER_NAMES[k].to_owned(),
+            unit: PARAMETER_UNITS[k].replace('²', "^2"),
+            file: body.stated.0[k],
+            value: body.inertia.0[k],
+            interval: body.half_width[k].map(|half| {
+                // Masses and moments of inertia are positive.
+                let least = if matches!(k, 0 | 4 | 7 | 9) { 0.0 } else { f64::NEG_INFINITY };
+                ((body.inertia.0[k] - half).max(least), body.inertia.0[k] + half)
+            }),
+            told: body.told[k],
+        };
+        ServoBodyRecord {
+            link: self.robot.mechanism.bodies()[body.body].name.clone(),
+            parameters: (0..PARAMETER_NAMES.len()).map(parameter).collect(),
         }
     }
 
@@ -587,6 +663,21 @@ impl ServoResult {
         told.map(|(names, what)| format!("{} {what}", names.join(", "))).collect()
     }
 
+    /// What is to be said of bodies that were to be found.
+    fn doubts_of_bodies(&self) -> Vec<String> {
+        let f = &self.found;
+        let mut out = Vec::new();
+        if !f.body_trials.is_empty() && f.bodies.is_empty() {
+            out.push(
+                "bodies are those of the robot file: others predict held-out parts no better".to_owned(),
+            );
+        }
+        if !f.bodies.is_empty() {
+            out.extend(f.body_repairs.iter().cloned());
+        }
+        out
+    }
+
     /// What a reader has to know before using the numbers.
     fn doubts(&self, parameters: &[ServoParameterRecord]) -> Vec<String> {
         let f = &self.found;
@@ -623,6 +714,7 @@ impl ServoResult {
             ));
         }
         out.extend(self.doubts_of_efforts());
+        out.extend(self.doubts_of_bodies());
         if f.step_share > 0.1 {
             out.push(format!(
                 "half the step moves the simulation by {:.0} % of the residual: a smaller `step_s` would move the estimate",
@@ -645,6 +737,14 @@ impl ServoResult {
 pub fn member(free: &Free, names: &[String]) -> String {
     let joints: Vec<&str> = free.joints().iter().map(|j| names[*j].as_str()).collect();
     format!("{} {}", free.as_term().map_or("inertia", Term::name), joints.join(", "))
+}
+
+impl ServoBodyRecord {
+    /// The inertia about the joint frame; `None` if the parameters are not those of a body in their order.
+    pub fn inertia(&self) -> Option<Inertia> {
+        let named = self.parameters.iter().map(|p| p.name.as_str()).eq(PARAMETER_NAMES);
+        named.then(|| Inertia(std::array::from_fn(|k| self.parameters[k].value)))
+    }
 }
 
 impl ServoGroupRecord {

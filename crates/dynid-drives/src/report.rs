@@ -114,16 +114,21 @@ fn capitalised(word: &str) -> String {
 }
 
 fn introduction(file: &ServoFile) -> Vec<String> {
+    let bodies = if file.bodies.is_empty() {
+        "the bodies of the robot file"
+    } else {
+        "bodies that deviate from those of the robot file as far as held-out folds ask for it"
+    };
     let hangs = if file.fit.efforts.iter().any(|e| e.rms.is_some()) {
-        "Efforts or currents were measured, and are met together with the positions, each weighted by its own noise; bodies are those of the \
-         robot file."
+        "Efforts or currents were measured, and are met together with the positions, each weighted by its own noise."
     } else {
         "No effort was measured: everything in N m hangs on the masses of the robot file and on stated gains."
     };
     vec![
-        "The robot is simulated in closed loop along the logged commands: `τ = k_p (s u + z - q) - k_d v` behind a delay, against rotor \
-         inertia, friction and the bodies of the robot file. The parameters are those whose simulation gives the measured positions."
-            .to_owned(),
+        format!(
+            "The robot is simulated in closed loop along the logged commands: `τ = k_p (s u + z - q) - k_d v` behind a delay, against rotor \
+             inertia, friction and {bodies}. The parameters are those whose simulation gives the measured positions."
+        ),
         format!(
             "Intervals are those of a jackknife over blocks of time, widened by what a value moves by with the step of the simulation, \
              without a fold of the logs, under richer laws and under other stated gains. {hangs}"
@@ -233,7 +238,7 @@ fn whole(file: &ServoFile) -> report::JointSection {
             .map(|g| vec![text(g.kind.word()), text(g.members.join("; ")), text(g.remedy.clone())])
             .collect(),
     };
-    let tables = [horizons, by_log, efforts, trials, directions, groups]
+    let tables = [horizons, by_log, bodies(file), efforts, trials, body_trials(file), directions, groups]
         .into_iter()
         .filter(|t| !t.rows.is_empty())
         .collect();
@@ -254,6 +259,54 @@ fn whole(file: &ServoFile) -> report::JointSection {
         curves: None,
         surface: None,
         charts: Vec::new(),
+    }
+}
+
+/// What was found of the bodies, parameter by parameter.
+fn bodies(file: &ServoFile) -> StudyTable {
+    let digits = |x: f64| format!("{x:.4}");
+    let rows = file.bodies.iter().flat_map(|body| {
+        body.parameters.iter().map(|p| {
+            let interval =
+                p.interval.map_or(Value::Undefined, |(a, b)| text(format!("{} to {}", digits(a), digits(b))));
+            vec![
+                text(body.link.clone()),
+                text(p.name.clone()),
+                Value::from(p.file),
+                Value::from(p.value),
+                interval,
+                text(p.unit.clone()),
+                text(if p.told { "yes" } else { "follows the robot file" }),
+            ]
+        })
+    });
+    StudyTable {
+        caption: "Bodies about their joint frames".to_owned(),
+        head: ["Link", "Parameter", "Robot file", "Found", "95 % interval", "Unit", "Told by the logs"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+fn body_trials(file: &ServoFile) -> StudyTable {
+    StudyTable {
+        caption:
+            "Pull towards the bodies of the robot file on held-out folds: error over that with these bodies"
+                .to_owned(),
+        head: ["Pull", "Fold 1", "Fold 2", "Fold 3", "Taken"].map(str::to_owned).to_vec(),
+        rows: file
+            .law
+            .bodies
+            .iter()
+            .map(|t| {
+                let mut row = vec![Value::from(t.pull)];
+                row.extend(t.ratios.iter().map(|r| Value::from(*r)));
+                row.resize(4, Value::Undefined);
+                row.push(text(if t.taken { "yes" } else { "no" }));
+                row
+            })
+            .collect(),
     }
 }
 
@@ -316,8 +369,14 @@ fn parameter(p: &ServoParameterRecord) -> Vec<Value> {
         p.interval.map_or(Value::Undefined, |(a, b)| text(format!("{} to {}", digits(a), digits(b))));
     let ratio = p.per_gain.map_or(Value::Undefined, |(r, h)| text(format!("{r:.5} ± {h:.5}")));
     let s = p.spread;
-    let moves =
-        [("law", s.law), ("step", s.step), ("folds", s.folds), ("gain", s.gain), ("reading", s.reading)];
+    let moves = [
+        ("law", s.law),
+        ("step", s.step),
+        ("folds", s.folds),
+        ("gain", s.gain),
+        ("reading", s.reading),
+        ("knowledge", s.knowledge),
+    ];
     let moves: Vec<String> =
         moves.iter().filter(|(_, x)| *x > 0.0).map(|(name, x)| format!("{name} {x:.2e}")).collect();
     vec![

@@ -1,10 +1,16 @@
 //! Parameters that a fit is free to choose.
 
+use dynid_model::Inertia;
+
+use crate::deviation::{Body, DEVIATIONS};
 use crate::joint::ServoJoint;
 use crate::term::Term;
 
+/// Farthest that a number of a deviation goes: masses and second moments by a factor of twenty.
+const MOST_DEVIATION: f64 = 1.5;
+
 /// What a free parameter is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Target {
     /// A term that these joints share.
     Term {
@@ -16,6 +22,26 @@ pub enum Target {
     /// A standard inertial parameter of the robot, by its place in
     /// [`Mechanism::inertia_vector`](dynid_model::Mechanism::inertia_vector). Of regrouped parameters the one that stands for them.
     Inertia(usize),
+    /// A number of a body's deviation.
+    Body(Body, usize),
+}
+
+/// What is known of a parameter beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation of the truth about it.
+    pub std: f64,
+    /// Factor by which a fit takes it for surer than that: rows with errors of one sign outweigh any knowledge.
+    pub pull: f64,
+}
+
+impl Known {
+    /// Its weight in a sum of squares, `(pull/std)²`.
+    pub(crate) fn weight(&self) -> f64 {
+        (self.pull / self.std).powi(2)
+    }
 }
 
 /// A free parameter with what is known of it beforehand.
@@ -27,8 +53,8 @@ pub struct Free {
     pub lower: f64,
     /// Greatest value.
     pub upper: f64,
-    /// Value and standard deviation known beforehand.
-    pub prior: Option<(f64, f64)>,
+    /// What is known beforehand.
+    pub prior: Option<Known>,
 }
 
 impl Free {
@@ -48,10 +74,18 @@ impl Free {
         Free { target: Target::Inertia(entry), lower: f64::NEG_INFINITY, upper: f64::INFINITY, prior: None }
     }
 
+    /// All numbers of a body's deviation, whose mass is known with a relative standard deviation, and that much surer to a fit.
+    pub fn body(body: Body, relative: f64, pull: f64) -> impl Iterator<Item = Self> {
+        (0..DEVIATIONS).map(move |k| {
+            let prior = Some(Known { value: 0.0, std: Body::std(k, relative), pull });
+            Free { target: Target::Body(body, k), lower: -MOST_DEVIATION, upper: MOST_DEVIATION, prior }
+        })
+    }
+
     /// Returns the parameter with a value known beforehand.
     #[must_use]
     pub fn known(mut self, value: f64, std: f64) -> Self {
-        self.prior = Some((value, std));
+        self.prior = Some(Known { value, std, pull: 1.0 });
         self
     }
 
@@ -59,15 +93,15 @@ impl Free {
     pub fn as_term(&self) -> Option<Term> {
         match &self.target {
             Target::Term { term, .. } => Some(*term),
-            Target::Inertia(_) => None,
+            Target::Inertia(_) | Target::Body(..) => None,
         }
     }
 
-    /// Joints that have the parameter; none for inertias.
+    /// Joints that have the parameter; none for inertias and bodies.
     pub fn joints(&self) -> &[usize] {
         match &self.target {
             Target::Term { joints, .. } => joints,
-            Target::Inertia(_) => &[],
+            Target::Inertia(_) | Target::Body(..) => &[],
         }
     }
 }
@@ -87,6 +121,7 @@ impl ServoValues {
         match &free.target {
             Target::Term { term, joints } => joints.first().map_or(0.0, |j| self.joints[*j].get(*term)),
             Target::Inertia(entry) => self.inertias[*entry],
+            Target::Body(body, k) => body.deviation(&self.body(body.body))[*k],
         }
     }
 
@@ -95,7 +130,18 @@ impl ServoValues {
         match &free.target {
             Target::Term { term, joints } => joints.iter().for_each(|j| self.joints[*j].set(*term, value)),
             Target::Inertia(entry) => self.inertias[*entry] = value,
+            Target::Body(body, k) => {
+                let mut deviation = body.deviation(&self.body(body.body));
+                deviation[*k] = value;
+                let first = DEVIATIONS * body.body;
+                self.inertias[first..first + DEVIATIONS].copy_from_slice(&body.inertia(&deviation).0);
+            }
         }
+    }
+
+    /// Inertia of a body about its joint frame.
+    pub fn body(&self, body: usize) -> Inertia {
+        Inertia(std::array::from_fn(|k| self.inertias[DEVIATIONS * body + k]))
     }
 
     /// Values of free parameters.

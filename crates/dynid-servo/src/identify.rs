@@ -5,19 +5,22 @@
 //! 2. Readings that stand out alone of what that misses are left out.
 //! 3. Efforts and currents that were measured, as far as they are those of the drives that the positions tell: they join the sum of squares, each
 //!    weighted by its own noise.
-//! 4. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
-//! 5. The step of the simulation is halved until it does not matter. Where nothing but rounding is left, encoders that stand still count less, row by
+//! 4. Bodies, where they are to be found: they deviate from those of the robot file as far as folds that were not fitted ask for it.
+//! 5. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
+//! 6. The step of the simulation is halved until it does not matter. Where nothing but rounding is left, encoders that stand still count less, row by
 //!    row, and the step is halved once more.
-//! 6. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
+//! 7. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
 //!    other gains ([`Spread`]). Where the model is wrong these decide.
-//! 7. Verdicts and groups of parameters that only act together.
+//! 8. Verdicts and groups of parameters that only act together.
 
+mod bodies;
 mod channels;
 mod efforts;
 mod outliers;
 mod result;
 mod verdict;
 
+use bodies::FoundBodies;
 use std::collections::BTreeSet;
 
 use dynid_model::Mechanism;
@@ -30,12 +33,13 @@ use crate::joint::Scheme;
 use crate::log::ServoLog;
 use crate::measured::Measured;
 use crate::rollout::Lost;
-use crate::settings::{Addition, Choice, ServoSettings};
+use crate::settings::{Addition, Bodies, Choice, ServoSettings};
 use crate::start::{StartSettings, linear_start};
 use crate::term::Term;
 pub use result::{
-    AdditionTrial, DirectionTrial, EffortUse, EffortVerdict, GroupKind, HorizonError, Outliers, ServoError,
-    ServoGroup, ServoIdentification, ServoParameter, ServoVerdict, Spread, TOLD_DIRECTION,
+    AdditionTrial, BodyTrial, DirectionTrial, EffortUse, EffortVerdict, GroupKind, HorizonError, Outliers,
+    ServoBody, ServoError, ServoGroup, ServoIdentification, ServoParameter, ServoVerdict, Spread,
+    TOLD_DIRECTION,
 };
 pub(crate) use verdict::groups;
 use verdict::parameters;
@@ -106,6 +110,7 @@ pub fn identify(
         efforts: Vec::new(),
         outliers: Vec::new(),
         by_span: Vec::new(),
+        bodies: Vec::new(),
         blocks: blocks(logs, settings.blocks),
         // A clock that jitters a little is no reason for another step.
         scheme: Scheme {
@@ -150,6 +155,10 @@ pub fn identify(
     let sigma: Vec<f64> =
         fitted.evaluation.variances(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
     let mut folds = work.held_out(&free, &fitted, &sigma);
+    let mut of_bodies = FoundBodies::default();
+    if settings.bodies == Bodies::Found {
+        of_bodies = work.find_bodies(mechanism, &laws, &mut fitted, &mut folds, &sigma)?;
+    }
     if settings.choice == Choice::HeldOut {
         loop {
             let round = work.round(&laws, &fitted, &folds, &sigma);
@@ -169,7 +178,8 @@ pub fn identify(
         richer = work.neighbours(&laws, &fitted, &sigma);
     }
     let found = work.judge(mechanism, laws, fitted, (trials, &richer), &other_step, start)?;
-    Ok(ServoIdentification { directions, ..found })
+    let FoundBodies { trials: body_trials, repairs: body_repairs } = of_bodies;
+    Ok(ServoIdentification { directions, body_trials, body_repairs, ..found })
 }
 
 fn check(mechanism: &Mechanism, logs: &[ServoLog], settings: &ServoSettings) -> Result<(), ServoError> {
@@ -239,6 +249,8 @@ struct Work<'a> {
     outliers: Vec<Outliers>,
     /// What parameters move by with the time over which efforts are read, where the logs do not tell it.
     by_span: Vec<(Free, f64)>,
+    /// Numbers of bodies that deviate.
+    bodies: Vec<Free>,
     blocks: Vec<Block>,
     scheme: Scheme,
     evaluations: usize,
@@ -334,7 +346,9 @@ impl Work<'_> {
     }
 
     fn free(&self, laws: &BTreeSet<Addition>) -> Vec<Free> {
-        self.settings.free(self.chains, laws, &self.measured)
+        let mut free = self.settings.free(self.chains, laws, &self.measured);
+        free.extend(self.bodies.iter().cloned());
+        free
     }
 
     fn fit(&mut self, laws: &BTreeSet<Addition>, start: &ServoValues) -> Result<Fitted, Lost> {
@@ -535,10 +549,15 @@ impl Work<'_> {
             (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
         let misfit = self.misfit(&fitted);
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
-        let spreads = self.spreads(&free, &fitted, (richer, other_step), is_wrong(misfit))?;
+        let mut spreads = self.spreads(&free, &fitted, (richer, other_step), is_wrong(misfit))?;
+        for (i, k) in found.inside.iter().enumerate() {
+            spreads[*k].knowledge = found.by_knowledge[(i, i)].sqrt();
+        }
         let mut groups = groups(&free, &found.inside, &found.correlation);
         let spreads = (spreads.as_slice(), other_step.error);
-        let parameters = parameters(&free, &fitted, &found, &groups, spreads, self.settings, &self.logs);
+        let mut parameters = parameters(&free, &fitted, &found, &groups, spreads, self.settings, &self.logs);
+        let bodies = verdict::bodies(&parameters, &fitted, &found);
+        parameters.truncate(free.len() - self.bodies.len());
         // A scale that measured efforts tell well is none that is open, however much it moves its members together.
         let settled = |k: &usize| {
             let p = &parameters[*k];
@@ -562,6 +581,9 @@ impl Work<'_> {
             groups,
             additions: laws.into_iter().collect(),
             trials,
+            bodies,
+            body_trials: Vec::new(),
+            body_repairs: Vec::new(),
             directions: Vec::new(),
             outliers: self.outliers.clone(),
             efforts: self.explained(&fitted),

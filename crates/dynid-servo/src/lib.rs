@@ -17,6 +17,7 @@
 
 pub mod chain;
 mod channel;
+mod deviation;
 pub mod fit;
 pub mod forecast;
 mod free;
@@ -32,10 +33,11 @@ mod term;
 
 pub use chain::Chain;
 pub use channel::{Channel, EffortAt};
-pub use free::{Free, ServoValues, Target};
+pub use deviation::{Body, DEVIATIONS};
+pub use free::{Free, Known, ServoValues, Target};
 pub use joint::{Hold, Limited, LoadOf, Scheme, ServoJoint};
 pub use log::ServoLog;
 pub use measured::Measured;
 pub use rollout::{Count, Lost, Rollout, Simulated, SimulatedEffort, SimulatedRow};
-pub use settings::{Addition, Choice, ServoSettings, Shared};
+pub use settings::{Addition, Bodies, Choice, ServoSettings, Shared};
 pub use term::Term;

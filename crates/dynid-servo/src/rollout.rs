@@ -5,6 +5,7 @@ mod sensed;
 use std::ops::Range;
 
 use crate::chain::{Chain, Equation};
+use crate::deviation::{Body, DEVIATIONS};
 use crate::free::{Free, ServoValues, Target};
 use crate::joint::{LoadOf, Scheme};
 use crate::log::{Command, ServoLog};
@@ -80,6 +81,29 @@ enum Kind {
     Term(Term, Vec<usize>),
     /// An entry of the chain's standard parameters.
     Inertia(usize),
+    /// A number of the deviation of a body, whose entries begin there.
+    Body(Body, usize, usize),
+}
+
+impl Column {
+    /// Slopes of the parameters of the body whose deviation it is of.
+    fn of_body(&self, values: &ServoValues) -> [f64; DEVIATIONS] {
+        match &self.kind {
+            Kind::Body(body, k, _) => body.slopes(&body.deviation(&values.body(body.body)))[*k],
+            _ => [0.0; DEVIATIONS],
+        }
+    }
+
+    /// Slope of an effort over the column, if it is one of inertias, from the effort's regressor.
+    fn of_regressor(&self, of_body: &[f64; DEVIATIONS], regressor: &[f64]) -> Option<f64> {
+        match &self.kind {
+            Kind::Term(..) => None,
+            Kind::Inertia(entry) => Some(regressor[*entry]),
+            Kind::Body(_, _, first) => {
+                Some(regressor[*first..].iter().zip(of_body).map(|(r, s)| r * s).sum())
+            }
+        }
+    }
 }
 
 /// Simulates a chain along a log.
@@ -112,9 +136,15 @@ impl<'a> Rollout<'a> {
                         columns.push(Column { place, kind: Kind::Inertia(local) });
                     }
                 }
+                Target::Body(body, k) => {
+                    let first = DEVIATIONS * body.body;
+                    if let Some(local) = chain.inertias.iter().position(|e| *e == first) {
+                        columns.push(Column { place, kind: Kind::Body(*body, *k, local) });
+                    }
+                }
             }
         }
-        let of_inertias = columns.iter().any(|c| matches!(c.kind, Kind::Inertia(_)));
+        let of_inertias = columns.iter().any(|c| !matches!(c.kind, Kind::Term(..)));
         let commands = [Term::Delay, Term::RateLimit, Term::SmoothingTime];
         let of_commands = columns.iter().any(|c| matches!(&c.kind, Kind::Term(t, _) if commands.contains(t)));
         let places = columns.iter().map(|c| c.place).collect();
@@ -211,6 +241,8 @@ struct Run<'a> {
     effort: Vec<f64>,
     sensed: Sensed,
     slopes: Slopes,
+    /// Per column of a body's deviation: slopes of the ten parameters of that body.
+    of_bodies: Vec<[f64; DEVIATIONS]>,
     steps: usize,
 }
 
@@ -284,6 +316,7 @@ impl<'a> Run<'a> {
                 accelerated: zeros(),
                 before: vec![0.0; p],
             },
+            of_bodies: rollout.columns.iter().map(|c| c.of_body(values)).collect(),
             steps: 0,
         }
     }
@@ -565,14 +598,17 @@ impl<'a> Run<'a> {
                             _ => 0.0,
                         }
                     }
-                    Kind::Inertia(entry) => {
-                        let i = j * equation.columns() + entry;
-                        to[c] += equation.regressor[i];
+                    Kind::Term(..) => {}
+                    Kind::Inertia(_) | Kind::Body(..) => {
+                        let own = j * equation.columns()..(j + 1) * equation.columns();
+                        let slope = |regressor: &[f64]| {
+                            column.of_regressor(&self.of_bodies[c], &regressor[own.clone()]).unwrap_or(0.0)
+                        };
+                        to[c] += slope(&equation.regressor);
                         if self.rollout.scheme.load == LoadOf::Bodies {
-                            to[c] += level * equation.bias_regressor[i];
+                            to[c] += level * slope(&equation.bias_regressor);
                         }
                     }
-                    Kind::Term(..) => {}
                 }
             }
             if solver.side[j] == 0.0 {

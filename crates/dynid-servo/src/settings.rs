@@ -64,11 +64,21 @@ pub enum Choice {
     Given(Vec<Addition>),
 }
 
+/// Where the inertias of links come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Bodies {
+    /// They are those of the robot file.
+    #[default]
+    File,
+    /// They deviate from those of the robot file, as far as held-out folds ask for it.
+    Found,
+}
+
 /// Standard deviations from what is known of it within which a zero must lie.
 const ZERO_STDS: f64 = 3.0;
 
 /// Standard deviations within which 95 % of a normal distribution lie.
-const QUANTILE: f64 = 1.96;
+pub(crate) const QUANTILE: f64 = 1.96;
 
 /// Farthest that measured efforts may lie behind or ahead of positions, s.
 const MOST_EFFORT_DELAY: f64 = 0.1;
@@ -108,6 +118,10 @@ pub struct ServoSettings {
     pub find: Vec<Term>,
     /// How additions are chosen.
     pub choice: Choice,
+    /// Where the inertias of links come from. Default: the robot file.
+    pub bodies: Bodies,
+    /// Relative error that masses of the robot file may have, 95 %, where bodies are found. Default 0.5.
+    pub body_error: f64,
     /// What commands do between samples. Default: held.
     pub hold: Hold,
     /// What load friction grows with. Default: the drive's effort.
@@ -137,6 +151,8 @@ impl ServoSettings {
             zero_std: 0.5,
             find: Vec::new(),
             choice: Choice::HeldOut,
+            bodies: Bodies::File,
+            body_error: 0.5,
             hold: Hold::Held,
             load: LoadOf::Drive,
             step_s: None,

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use dynid::record::Outcome;
 use dynid::servo::{
-    ServoConfig, ServoEffortRecord, ServoFile, ServoFiles, ServoParameterRecord, identify_servo,
+    BodyParameterRecord, ServoBodyRecord, ServoConfig, ServoEffortRecord, ServoFile, ServoFiles,
+    ServoParameterRecord, identify_servo,
 };
 use dynid::settings::PerJoint;
 use dynid_terminal::message::{Failure, Notes, data};
@@ -69,6 +70,12 @@ fn summary(file: &ServoFile) -> String {
     let rows: Vec<Vec<String>> = file.parameters.iter().map(row).collect();
     let head = ["parameter", "joints", "value", "from", "to", "unit", "verdict"];
     let mut out = table::aligned(&head, &rows);
+    if !file.bodies.is_empty() {
+        let head = ["link", "body", "file", "value", "from", "to", "unit", "told"];
+        let rows: Vec<Vec<String>> = file.bodies.iter().flat_map(body).collect();
+        out += "\n";
+        out += &table::aligned(&head, &rows);
+    }
     for group in &file.groups {
         out += &format!(
             "\nknown together only ({}): {}\n  {}\n",
@@ -96,6 +103,23 @@ fn summary(file: &ServoFile) -> String {
             &format!("validation {}:{}; command{}\n", log.log, per_joint(&rms), per_joint(&log.command_rms));
     }
     out + &format!("\n{}: {}\n", file.status, file.headline)
+}
+
+/// Mass and centre of a body; all parameters are in the files.
+fn body(body: &ServoBodyRecord) -> Vec<Vec<String>> {
+    let row = |p: &BodyParameterRecord| {
+        vec![
+            body.link.clone(),
+            p.name.clone(),
+            table::number(Some(p.file)),
+            table::number(Some(p.value)),
+            table::number(p.interval.map(|i| i.0)),
+            table::number(p.interval.map(|i| i.1)),
+            p.unit.clone(),
+            if p.told { "yes" } else { "no" }.to_owned(),
+        ]
+    };
+    body.parameters.iter().take(4).map(row).collect()
 }
 
 fn effort(e: &ServoEffortRecord) -> Vec<String> {

@@ -69,7 +69,13 @@ pub(super) fn load(config: &DesignConfig) -> Result<Option<(Robot, Drives)>, Err
         (Some(path), None) => {
             let found = FoundDrives::read(path, &config.robot, &config.locked, config.gravity)?;
             let settings = found.settings(period)?;
-            let warnings = found.warnings.clone();
+            let mut warnings = found.warnings.clone();
+            if !found.file.bodies.is_empty() {
+                warnings.push(
+                    "bodies are those that were found, and count as known: forecasts leave their errors out"
+                        .to_owned(),
+                );
+            }
             let drives = Drives::new(&found.robot, config, settings, Some(&found), warnings)?;
             Ok(Some((found.robot, drives)))
         }
@@ -240,7 +246,7 @@ impl Drives {
         let rows: Vec<(usize, f64)> = kept
             .iter()
             .enumerate()
-            .filter_map(|(c, (k, _))| self.free[*k].prior.map(|(_, std)| (c, 1.0 / std)))
+            .filter_map(|(c, (k, _))| self.free[*k].prior.map(|known| (c, 1.0 / known.std)))
             .collect();
         let mut out = Mat::zeros(rows.len(), kept.len());
         for (row, (column, weight)) in rows.iter().enumerate() {

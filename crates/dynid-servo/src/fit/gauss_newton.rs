@@ -214,16 +214,16 @@ pub(crate) fn with_priors(
     estimate: &[f64],
 ) -> (Mat, Vec<f64>) {
     for (k, f) in free.iter().enumerate() {
-        if let Some((value, std)) = f.prior {
-            hessian[(k, k)] += 1.0 / (std * std);
-            gradient[k] += (value - estimate[k]) / (std * std);
+        if let Some(known) = &f.prior {
+            hessian[(k, k)] += known.weight();
+            gradient[k] += (known.value - estimate[k]) * known.weight();
         }
     }
     (hessian, gradient)
 }
 
 fn prior_loss(free: &[Free], estimate: &[f64]) -> f64 {
-    let known = |(f, x): (&Free, &f64)| f.prior.map_or(0.0, |(value, std)| ((x - value) / std).powi(2));
+    let known = |(f, x): (&Free, &f64)| f.prior.map_or(0.0, |p| (x - p.value).powi(2) * p.weight());
     free.iter().zip(estimate).map(known).sum()
 }
 

@@ -1,9 +1,12 @@
 //! What an identification is made of.
 
+use dynid_estimate::prior::PriorError;
+use dynid_model::Inertia;
 use dynid_motion::signal::SignalError;
 
 use crate::chain::Chain;
 use crate::channel::Channel;
+use crate::deviation::DEVIATIONS;
 use crate::fit::Ending;
 use crate::free::{Free, ServoValues};
 use crate::joint::Scheme;
@@ -21,6 +24,9 @@ pub enum ServoError {
         /// Why.
         source: SignalError,
     },
+    /// Bodies of the robot file that nothing can be known of.
+    #[error(transparent)]
+    Bodies(#[from] PriorError),
     /// The simulation got lost.
     #[error(transparent)]
     Lost(#[from] Lost),
@@ -72,6 +78,8 @@ pub struct Spread {
     /// Change with the time over which efforts are read, a period or an instant, where the logs do not tell it. Both are right for some sensor, so that the
     /// value is not called unstable for it.
     pub reading: f64,
+    /// Standard deviation by what is known beforehand, which may be off by its own.
+    pub knowledge: f64,
 }
 
 /// What can be said of a parameter.
@@ -152,6 +160,33 @@ pub struct AdditionTrial {
     pub ratios: Vec<f64>,
     /// Whether it was taken.
     pub taken: bool,
+}
+
+/// Bodies that were left free, and what held-out folds say to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyTrial {
+    /// Factor by which the robot file was taken for surer than it is said to be.
+    pub pull: f64,
+    /// Held-out error over that with the bodies of the robot file, per fold; `NaN`: the simulation got lost.
+    pub ratios: Vec<f64>,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// A body that was found. Lists go by its ten standard parameters about the joint frame ([`Inertia`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoBody {
+    /// Body of the mechanism.
+    pub body: usize,
+    /// What the robot file states, repaired if no body can have that.
+    pub stated: Inertia,
+    /// What was found: an inertia that a body can have.
+    pub inertia: Inertia,
+    /// Half widths of 95 % intervals, with what the robot file may be off by.
+    pub half_width: [Option<f64>; DEVIATIONS],
+    /// Whether the logs tell the parameter: its interval is a third of what the robot file's error leaves it, or less, and would be so if that error were four times
+    /// as large.
+    pub told: [bool; DEVIATIONS],
 }
 
 /// A direction that was looked for.
@@ -244,6 +279,12 @@ pub struct ServoIdentification {
     pub additions: Vec<Addition>,
     /// Additions that were tried.
     pub trials: Vec<AdditionTrial>,
+    /// Bodies that were found; empty where they are those of the robot file.
+    pub bodies: Vec<ServoBody>,
+    /// Pulls towards the robot file that were tried where bodies were to be found.
+    pub body_trials: Vec<BodyTrial>,
+    /// What was mended in the robot file before bodies were found, in words.
+    pub body_repairs: Vec<String>,
     /// Directions that were looked for.
     pub directions: Vec<DirectionTrial>,
     /// Readings that were left out.

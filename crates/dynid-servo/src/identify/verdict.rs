@@ -2,11 +2,12 @@
 
 use dynid_linalg::Mat;
 
-use super::result::{GroupKind, ServoGroup, ServoParameter, ServoVerdict, Spread};
+use super::result::{GroupKind, ServoBody, ServoGroup, ServoParameter, ServoVerdict, Spread};
+use crate::deviation::DEVIATIONS;
 use crate::fit::{Deviations, Fitted, Place};
-use crate::free::Free;
+use crate::free::{Free, Target};
 use crate::log::ServoLog;
-use crate::settings::ServoSettings;
+use crate::settings::{QUANTILE, ServoSettings};
 use crate::term::Term;
 
 /// Parameters with intervals and verdicts. `open`: those that are known together only.
@@ -28,7 +29,7 @@ pub(super) fn parameters(
             let parts = [t * sd, spread.law, of_step * spread.step, t * spread.folds, spread.gain];
             // Folds and jackknife measure the same thing: the larger counts.
             let own = parts[0].max(parts[3]);
-            let others = [parts[1], parts[2], parts[4], spread.reading];
+            let others = [parts[1], parts[2], parts[4], spread.reading, QUANTILE * spread.knowledge];
             others.iter().fold(own * own, |sum, x| sum + x * x).sqrt()
         });
         let joint = f.joints().first().map(|j| &fitted.values.joints[*j]);
@@ -41,7 +42,7 @@ pub(super) fn parameters(
             }
             _ => value.abs(),
         };
-        let of_prior = f.prior.is_some_and(|(_, sd)| found.model[k].is_none_or(|m| m > sd / 3.0));
+        let of_prior = f.prior.is_some_and(|p| found.model[k].is_none_or(|m| m > p.std / 3.0));
         let verdict = match (fitted.places[k], half_width, std) {
             (Place::AtLower | Place::AtUpper, ..) => ServoVerdict::AtBound,
             (Place::Unseen, ..) => ServoVerdict::NotSeen,
@@ -60,7 +61,9 @@ pub(super) fn parameters(
             }
             _ => ServoVerdict::NotSeen,
         };
-        let half_width = half_width.filter(|_| verdict != ServoVerdict::Prior);
+        // Numbers of bodies are no results: what they make of masses is.
+        let is_result = f.as_term().is_some();
+        let half_width = half_width.filter(|_| verdict != ServoVerdict::Prior || !is_result);
         let in_scale = f.as_term().is_some_and(Term::scales_with_effort)
             && open.iter().any(|g| g.kind == GroupKind::Scale && g.members.contains(&k));
         let interval = half_width.and_then(|half| {
@@ -109,13 +112,60 @@ fn per_gain(free: &[Free], fitted: &Fitted, found: &Deviations, k: usize, t: f64
 /// Correlation from which parameters count as one.
 const TOGETHER: f64 = 0.9;
 
-/// Parameters whose estimates go together: `correlation` is that of the parameters `inside`.
+/// Bodies that were free, from the numbers of their deviations among the `parameters`.
+pub(super) fn bodies(parameters: &[ServoParameter], fitted: &Fitted, found: &Deviations) -> Vec<ServoBody> {
+    let mut out = Vec::new();
+    for (first, p) in parameters.iter().enumerate() {
+        let Target::Body(body, 0) = p.free.target else { continue };
+        let own = &parameters[first..first + DEVIATIONS];
+        let slopes = body.slopes(&std::array::from_fn(|k| own[k].value));
+        let at: Option<Vec<usize>> =
+            (first..first + DEVIATIONS).map(|k| found.inside.iter().position(|i| *i == k)).collect();
+        let covariance = |a: usize, b: usize| found.covariance[(a, b)] + found.by_knowledge[(a, b)];
+        // Half widths of the numbers, with all that widens them, together as their covariance has it.
+        let half_width = |c: usize| {
+            let at = at.as_ref().filter(|_| found.covariance.nrows() > 0)?;
+            let part = |k: usize| Some(slopes[k][c] * own[k].half_width? / covariance(at[k], at[k]).sqrt());
+            let parts = (0..DEVIATIONS).map(part).collect::<Option<Vec<f64>>>()?;
+            let line = |i: usize| (0..DEVIATIONS).map(|j| parts[j] * covariance(at[i], at[j])).sum::<f64>();
+            Some((0..DEVIATIONS).map(|i| parts[i] * line(i)).sum::<f64>().max(0.0).sqrt())
+        };
+        let known = |c: usize| {
+            let of = |k: usize| own[k].free.prior.map_or(0.0, |p| slopes[k][c] * p.std);
+            (0..DEVIATIONS).map(|k| of(k).powi(2)).sum::<f64>().sqrt()
+        };
+        // Told by the readings, not by how the robot file's errors are thought to go together.
+        let by_readings = |c: usize| {
+            let Some(at) = &at else { return f64::INFINITY };
+            let line = |i: usize| {
+                (0..DEVIATIONS).map(|j| slopes[j][c] * found.by_readings[(at[i], at[j])]).sum::<f64>()
+            };
+            (0..DEVIATIONS).map(|i| slopes[i][c] * line(i)).sum::<f64>().max(0.0).sqrt()
+        };
+        let half_width: [Option<f64>; DEVIATIONS] = std::array::from_fn(half_width);
+        let told = |c: usize| {
+            let most = known(c) / 3.0;
+            half_width[c].is_some_and(|half| half <= QUANTILE * most) && by_readings(c) <= most
+        };
+        out.push(ServoBody {
+            body: body.body,
+            stated: body.inertia(&[0.0; DEVIATIONS]),
+            inertia: fitted.values.body(body.body),
+            half_width,
+            told: std::array::from_fn(told),
+        });
+    }
+    out
+}
+
+/// Parameters whose estimates go together: `correlation` is that of the parameters `inside`. Numbers of bodies are no members.
 pub(crate) fn groups(free: &[Free], inside: &[usize], correlation: &Mat) -> Vec<ServoGroup> {
     let m = inside.len();
     let mut group: Vec<usize> = (0..m).collect();
     for i in 0..m {
         for j in 0..i {
-            if correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
+            let terms = [i, j].iter().all(|k| free[inside[*k]].as_term().is_some());
+            if terms && correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
                 let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
                 group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }

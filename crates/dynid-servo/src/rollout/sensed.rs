@@ -1,6 +1,6 @@
 //! Efforts of a simulation at the instants at which a log measures them.
 
-use super::{Kind, Rollout, Run, Simulated, SimulatedEffort};
+use super::{Rollout, Run, Simulated, SimulatedEffort};
 use crate::channel::{Channel, EffortAt};
 use crate::free::ServoValues;
 use crate::log::{Command, ServoLog};
@@ -189,9 +189,8 @@ impl Run<'_> {
                 }
             }
             for (c, column) in self.rollout.columns.iter().enumerate() {
-                if let Kind::Inertia(entry) = &column.kind {
-                    to[c] += equation.regressor[j * equation.columns() + entry];
-                }
+                let own = &equation.regressor[j * equation.columns()..][..equation.columns()];
+                to[c] += column.of_regressor(&self.of_bodies[c], own).unwrap_or(0.0);
             }
         }
     }

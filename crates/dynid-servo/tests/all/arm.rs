@@ -70,10 +70,11 @@ pub(crate) const PERIOD: f64 = 0.005;
 /// Step of an encoder of 12 bits.
 pub(crate) const STEP: f64 = TAU / 4096.0;
 
-/// Commands: sums of sinusoids from 0.1 to 5 Hz with random phases, and pauses.
-pub(crate) fn commands(random: &mut ChaCha8Rng, rows: usize) -> Vec<Vec<f64>> {
-    (0..2)
-        .map(|j| {
+/// Commands about a posture: sums of sinusoids from 0.1 to 5 Hz with random phases, and a pause.
+pub(crate) fn commands(random: &mut ChaCha8Rng, rows: usize, posture: &[f64]) -> Vec<Vec<f64>> {
+    posture
+        .iter()
+        .map(|middle| {
             let waves: Vec<[f64; 3]> = [0.13, 0.31, 0.7, 1.3, 2.7, 4.6]
                 .iter()
                 .map(|f| {
@@ -82,7 +83,7 @@ pub(crate) fn commands(random: &mut ChaCha8Rng, rows: usize) -> Vec<Vec<f64>> {
                 .collect();
             let value = |t: f64| {
                 let sum: f64 = waves.iter().map(|[f, a, p]| a * (TAU * f * t + p).sin()).sum();
-                sum + if j == 0 { -0.6 } else { 0.8 }
+                sum + middle
             };
             // One pause of a second in the middle.
             let time = |k: usize| {
@@ -103,21 +104,33 @@ pub(crate) fn log(
     rows: usize,
     seed: u64,
 ) -> ServoLog {
+    log_about(&[-0.6, 0.8], mechanism, (joints, &mechanism.inertia_vector()), scheme, (rows, seed))
+}
+
+/// A log of a simulated robot that moves about a posture, rounded by its encoders.
+pub(crate) fn log_about(
+    posture: &[f64],
+    mechanism: &Mechanism,
+    (joints, inertias): (&[ServoJoint], &[f64]),
+    scheme: Scheme,
+    (rows, seed): (usize, u64),
+) -> ServoLog {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let command = commands(&mut random, rows);
+    let command = commands(&mut random, rows, posture);
     let time: Vec<f64> = (0..rows).map(|k| k as f64 * PERIOD).collect();
-    let values = ServoValues { joints: joints.to_vec(), inertias: mechanism.inertia_vector() };
+    let values = ServoValues { joints: joints.to_vec(), inertias: inertias.to_vec() };
     let mut log = ServoLog::new(format!("log {seed}"), time, command.clone(), command.clone());
     log.start = Some(command.iter().map(|c| c[0]).collect());
-    let chains = Chain::all(mechanism);
-    let mut position = vec![Vec::new(); 2];
-    Rollout::new(&chains[0], scheme, &[])
-        .run(&values, &log, |row| {
-            for (to, x) in position.iter_mut().zip(row.reading) {
-                to.push((x / STEP).round() * STEP);
-            }
-        })
-        .unwrap();
+    let mut position = vec![Vec::new(); joints.len()];
+    for chain in Chain::all(mechanism) {
+        Rollout::new(&chain, scheme, &[])
+            .run(&values, &log, |row| {
+                for (j, x) in chain.joints.iter().zip(row.reading) {
+                    position[*j].push((x / STEP).round() * STEP);
+                }
+            })
+            .unwrap();
+    }
     let start = log.start.take();
     let mut log = ServoLog::new(log.name, log.time, command, position);
     log.start = start;
@@ -179,4 +192,15 @@ pub(crate) fn held(found: &ServoIdentification, truth: &[ServoJoint], count: &mu
             None => count.push((term, inside, 1)),
         }
     }
+}
+
+/// Machines of the statistical tests: few by default, `DYNID_MACHINES` of them where they are to be counted.
+pub(crate) fn machines() -> usize {
+    std::env::var("DYNID_MACHINES").ok().and_then(|n| n.parse().ok()).unwrap_or(12)
+}
+
+/// Share of the intervals that hold.
+pub(crate) fn share(count: &[(Term, usize, usize)]) -> f64 {
+    let (hits, of) = count.iter().fold((0, 0), |(h, o), (_, hits, of)| (h + hits, o + of));
+    hits as f64 / of as f64
 }

@@ -5,7 +5,7 @@ use dynid_servo::{Addition, Choice, LoadOf, Scheme, ServoJoint, ServoSettings, S
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::arm::{PERIOD, arm, drives, held, log};
+use crate::arm::{PERIOD, arm, drives, held, log, machines, share};
 
 /// What is known of the arm's drives: their velocity gains.
 fn settings(joints: &[ServoJoint], law: &[Addition]) -> ServoSettings {
@@ -23,16 +23,6 @@ fn settings(joints: &[ServoJoint], law: &[Addition]) -> ServoSettings {
 
 fn scheme(step_s: f64) -> Scheme {
     Scheme { step_s: step_s * (1.0 + 1e-6), load: LoadOf::Bodies, ..Scheme::default() }
-}
-
-/// Machines of the statistical tests: few by default, `DYNID_MACHINES` of them where they are to be counted.
-fn machines() -> usize {
-    std::env::var("DYNID_MACHINES").ok().and_then(|n| n.parse().ok()).unwrap_or(12)
-}
-
-fn share(count: &[(Term, usize, usize)]) -> f64 {
-    let (hits, of) = count.iter().fold((0, 0), |(h, o), (_, hits, of)| (h + hits, o + of));
-    hits as f64 / of as f64
 }
 
 #[test]

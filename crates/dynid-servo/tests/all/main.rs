@@ -7,3 +7,4 @@ mod efforts;
 mod golden;
 mod identification;
 mod motion;
+mod quadruped;

@@ -5,7 +5,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dynid::servo::{ServoConfig, ServoEffortVerdict, ServoFile, ServoFiles, ServoVerdict, identify_servo};
+use dynid::servo::{
+    FoundDrives, ServoConfig, ServoEffortVerdict, ServoFile, ServoFiles, ServoVerdict, identify_servo,
+};
 use dynid::servo_fits::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Simulated, Term};
 use dynid::{Robot, RobotOptions};
 use tempfile::TempDir;
@@ -394,6 +396,76 @@ fn columns_of_other_names_and_units_are_read() {
     let named = format!("{PLAIN}law = [\"offset\"]\n");
     let same = identify_servo(&config(&folder, &named), &mut |_| {}).unwrap();
     assert_eq!(found.found.values, same.found.values);
+}
+
+#[test]
+fn bodies_that_the_robot_file_has_wrong_are_found_and_go_where_they_are_used() {
+    let folder = folder();
+    // The file is off by a quarter in mass and by a fifth in the centre, links otherwise alike.
+    let wrong = ARM
+        .replace("xyz=\"0.15 0 0\"/><mass value=\"1.2\"", "xyz=\"0.18 0 0\"/><mass value=\"0.9\"")
+        .replace("xyz=\"0.12 0 0\"/><mass value=\"0.8\"", "xyz=\"0.10 0 0\"/><mass value=\"1.0\"");
+    assert_ne!(wrong, ARM);
+    std::fs::write(folder.path().join("arm.urdf"), &wrong).unwrap();
+    let known = "robot = \"arm.urdf\"\nlock = { finger = 0.0 }\n[[log]]\npath = \"a.csv\"\n[[validation]]\npath = \"b.csv\"\n\
+        [servo]\nposition_gain = 25\ngain_error = 0.0\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let of_file = identify_servo(&config(&folder, known), &mut |_| {}).unwrap();
+    let asked = config(&folder, &format!("{known}bodies = \"found\"\n"));
+    let result = identify_servo(&asked, &mut |_| {}).unwrap();
+    assert!(of_file.found.misfit > 3.0 && result.found.misfit < 1.1, "{}", result.found.misfit);
+    // On another motion, both joints together.
+    let whole = |rms: &[f64]| rms.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let (wrong, right) = (whole(&of_file.validation_rms[0]), whole(&result.validation_rms[0]));
+    assert!(right < 0.5 * wrong, "{right} {wrong}");
+    // What the logs tell is right: gravity tells the first moments of the arm along its links, the file's were off by 10 and 15 %.
+    let options = RobotOptions { locked: vec![("finger".to_owned(), 0.0)], ..RobotOptions::default() };
+    let robot = |text: &str| Robot::parse(text, Path::new("arm.urdf"), &options).unwrap();
+    let truth = robot(ARM).mechanism.inertia_vector();
+    let told: Vec<(usize, usize)> = result
+        .found
+        .bodies
+        .iter()
+        .flat_map(|b| (0..10).filter(|k| b.told[*k]).map(move |k| (b.body, k)))
+        .collect();
+    assert!(told.contains(&(1, 1)), "{told:?}");
+    for (body, k) in told {
+        let found = &result.found.bodies[body];
+        let (value, half) = (found.inertia.0[k], found.half_width[k].unwrap());
+        let true_value = truth[10 * body + k];
+        assert!((value - true_value).abs() <= half, "{body} {k}: {value} ± {half}, truth {true_value}");
+    }
+    // The files, the result that is read again, and drives that are simulated have these bodies.
+    let names = ServoFiles::names(&folder.path().join("arm.urdf")).unwrap();
+    let files = result.files().unwrap();
+    assert_eq!(
+        files.files.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        names.iter().collect::<Vec<_>>()
+    );
+    let urdf = robot(&files.files[0].1).mechanism.inertia_vector();
+    let found: Vec<f64> = (0..2).flat_map(|b| result.found.values.body(b).0).collect();
+    for (a, b) in urdf.iter().zip(&found) {
+        assert!((a - b).abs() < 1e-12, "{a} {b}");
+    }
+    let mjcf = Robot::parse(&files.files[1].1, Path::new("arm.xml"), &options).unwrap();
+    for (a, b) in mjcf.mechanism.inertia_vector().iter().zip(&found) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    let path = folder.path().join("servo.json");
+    let file = result.file(&asked, &files.notes);
+    std::fs::write(&path, file.to_json()).unwrap();
+    let again = FoundDrives::read(&path, &asked.robot, &Default::default(), None).unwrap();
+    assert_eq!(again.robot.mechanism.inertia_vector(), found);
+    // A file whose bodies are none of the robot's, or no bodies at all, is refused.
+    let broken = |edit: &dyn Fn(&mut ServoFile)| {
+        let mut file = file.clone();
+        edit(&mut file);
+        std::fs::write(&path, file.to_json()).unwrap();
+        let read = FoundDrives::read(&path, &asked.robot, &Default::default(), None);
+        read.err().map(|e| e.to_string()).unwrap()
+    };
+    assert!(broken(&|f| f.bodies[0].link = "other".to_owned()).contains("upper"));
+    assert!(broken(&|f| f.bodies[0].parameters[0].value = -1.0).contains("upper"));
+    assert!(broken(&|f| f.bodies[1].parameters.truncate(9)).contains("fore"));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dynid_config::config::ElementsConfig;
 use dynid_config::nominal::nominal_parameters;
-use dynid_drives::config::DriveConfig;
+use dynid_drives::config::{BodiesName, DriveConfig};
 use dynid_drives::{FoundDrives, stated};
 use dynid_excitation::MotionLimits;
 use dynid_identify::Error;
@@ -56,6 +56,11 @@ pub(super) fn refuse(config: &DesignConfig) -> Result<(), Error> {
             "servo.find_directions",
             config.servo.as_ref().is_some_and(|s| s.find_directions),
             "`direction` of every joint that is not 1: a motion goes where it is sent",
+        ),
+        (
+            "servo.bodies",
+            config.servo.as_ref().is_some_and(|s| s.bodies != BodiesName::File),
+            "`file`: a design counts bodies as known, those of the robot file or, with `drives`, those that were found",
         ),
         (
             "servo.gain_error",
