@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dynid_export::{LinkInertias, Source};
+use dynid_export::{LinkFault, LinkInertias, Source};
 use dynid_files::FileMember;
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
@@ -95,7 +95,10 @@ impl ServoResult {
                 ..spring(name)
             })
             .collect();
-        let (links, mut notes) = self.links(&source)?;
+        let LinkInertias { links, faults, mut notes } = self.links(&source)?;
+        let of_fault =
+            |f: &LinkFault| format!("link `{}` of the files is no possible body: {}", f.link, f.fault);
+        notes.extend(faults.iter().map(of_fault));
         let mut files = Vec::new();
         let own = FileMember::of(&self.robot.path).path;
         let name = own.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -146,19 +149,14 @@ impl ServoResult {
         Ok(ServoFiles { files, notes })
     }
 
-    /// Links whose inertia was found, and notes in words.
-    fn links(&self, source: &Source) -> Result<(Vec<(String, Inertia)>, Vec<String>), Error> {
+    /// Links whose inertia was found; none where bodies are those of the robot file.
+    fn links(&self, source: &Source) -> Result<LinkInertias, Error> {
         if self.found.bodies.is_empty() {
-            return Ok((Vec::new(), Vec::new()));
+            return Ok(LinkInertias::default());
         }
         let mechanism = &self.robot.mechanism;
         let bodies: Vec<Inertia> = (0..mechanism.bodies().len()).map(|b| self.found.values.body(b)).collect();
-        let LinkInertias { links, faults, mut notes } =
-            LinkInertias::of(source, mechanism, &self.robot.file.description, &bodies)?;
-        notes.extend(
-            faults.iter().map(|f| format!("link `{}` of the files is no possible body: {}", f.link, f.fault)),
-        );
-        Ok((links, notes))
+        LinkInertias::of(source, mechanism, &self.robot.file.description, &bodies)
     }
 
     /// What damping, friction loss, armature and affine actuators cannot say.

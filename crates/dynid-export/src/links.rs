@@ -7,7 +7,7 @@ use super::bodies::{self, Shares};
 use super::{ExportError, LinkFault, Source, held_joints};
 
 /// Inertias of links, from those of the bodies that they make up.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LinkInertias {
     /// Links whose inertia changes, about their own frame.
     pub links: Vec<(String, Inertia)>,

@@ -10,11 +10,27 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::arm::{PERIOD, held, log_about, machines, share};
 
-/// Hip, thigh and calf: mass, centre and moments of inertia about it, and the way to the next joint.
-const LEG: [(&str, f64, [f64; 3], f64, [f64; 3]); 3] = [
-    ("hip", 0.68, [0.005, 0.004, 0.0], 8e-4, [0.0, 0.1, 0.0]),
-    ("thigh", 1.15, [-0.004, -0.02, -0.03], 6e-3, [0.0, 0.0, -0.21]),
-    ("calf", 0.24, [0.006, 0.0, -0.12], 3e-3, [0.0, 0.0, 0.0]),
+/// A link of a leg.
+struct Part {
+    name: &'static str,
+    mass: f64,
+    centre: [f64; 3],
+    /// Moment of inertia about the centre, across the link.
+    inertia: f64,
+    /// From its joint to the next.
+    next: [f64; 3],
+}
+
+const LEG: [Part; 3] = [
+    Part { name: "hip", mass: 0.68, centre: [0.005, 0.004, 0.0], inertia: 8e-4, next: [0.0, 0.1, 0.0] },
+    Part {
+        name: "thigh",
+        mass: 1.15,
+        centre: [-0.004, -0.02, -0.03],
+        inertia: 6e-3,
+        next: [0.0, 0.0, -0.21],
+    },
+    Part { name: "calf", mass: 0.24, centre: [0.006, 0.0, -0.12], inertia: 3e-3, next: [0.0, 0.0, 0.0] },
 ];
 
 /// Where the legs hang.
@@ -26,14 +42,14 @@ fn quadruped() -> Mechanism {
     for (leg, x, y) in [("FL", 0.19, 0.05), ("FR", 0.19, -0.05), ("RL", -0.19, 0.05), ("RR", -0.19, -0.05)] {
         let mut parent = "trunk".to_owned();
         let mut at = [x, y, 0.0];
-        for (k, (part, mass, centre, inertia, next)) in LEG.into_iter().enumerate() {
-            let name = format!("{leg}_{part}");
+        for (k, part) in LEG.iter().enumerate() {
+            let name = format!("{leg}_{}", part.name);
             let mirrored = |v: [f64; 3]| [v[0], v[1] * f64::signum(y), v[2]];
-            let tensor =
-                Mat3::from_rows([[inertia, 0.0, 0.0], [0.0, inertia, 0.0], [0.0, 0.0, 0.3 * inertia]]);
+            let across = part.inertia;
+            let tensor = Mat3::from_rows([[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, 0.3 * across]]);
             robot.links.push(LinkDescription {
                 name: name.clone(),
-                inertia: Some(Inertia::from_com(mass, Vec3(mirrored(centre)), &tensor)),
+                inertia: Some(Inertia::from_com(part.mass, Vec3(mirrored(part.centre)), &tensor)),
             });
             robot.joints.push(JointDescription {
                 name: format!("{name}_joint"),
@@ -45,7 +61,7 @@ fn quadruped() -> Mechanism {
                 limits: Default::default(),
                 mimic: None,
             });
-            at = mirrored(next);
+            at = mirrored(part.next);
         }
     }
     robot.build().unwrap()
@@ -91,10 +107,18 @@ struct Case {
     bodies: bool,
 }
 
-/// Intervals of drives by term, and of what is told of the bodies, that hold the truth, and all.
-fn coverage(case: Case, machines: u64) -> (Vec<(Term, usize, usize)>, (usize, usize)) {
+/// Intervals that hold the truth, and all.
+#[derive(Debug, Default)]
+struct Coverage {
+    /// Of drives, by term.
+    drives: Vec<(Term, usize, usize)>,
+    /// Of what is told of the bodies.
+    bodies: (usize, usize),
+}
+
+fn coverage(case: Case, machines: u64) -> Coverage {
     let mechanism = quadruped();
-    let (mut count, mut of_bodies) = (Vec::new(), (0, 0));
+    let mut count = Coverage::default();
     for seed in 0..machines {
         let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
         let truth = drives(&mut random, case.rich);
@@ -126,17 +150,17 @@ fn coverage(case: Case, machines: u64) -> (Vec<(Term, usize, usize)>, (usize, us
         let found = identify(&mechanism, &[log], &settings).unwrap();
         assert!(found.misfit < 1.1, "{case:?} {seed}: {}", found.misfit);
         assert_eq!(found.bodies.len(), if case.bodies { 0 } else { 12 });
-        held(&found, &truth, &mut count);
+        held(&found, &truth, &mut count.drives);
         for body in &found.bodies {
             assert!(body.inertia.physical_fault().is_none(), "{body:?}");
             for (k, half) in body.half_width.iter().enumerate().filter(|(k, _)| body.told[*k]) {
                 let error = (body.inertia.0[k] - inertias[DEVIATIONS * body.body + k]).abs();
-                of_bodies.0 += usize::from(half.is_some_and(|half| error <= half));
-                of_bodies.1 += 1;
+                count.bodies.0 += usize::from(half.is_some_and(|half| error <= half));
+                count.bodies.1 += 1;
             }
         }
     }
-    (count, of_bodies)
+    count
 }
 
 #[test]
@@ -158,7 +182,8 @@ fn intervals_hold_in_the_air() {
     let cases = if counted { &all[..] } else { &all[..2] };
     for case in cases {
         let share_of_machines = if case.bodies { 4 } else { 12 };
-        let (count, of_bodies) = coverage(*case, (machines() / share_of_machines) as u64);
+        let Coverage { drives: count, bodies: of_bodies } =
+            coverage(*case, (machines() / share_of_machines) as u64);
         println!("{case:?}: {:.3} {count:?} bodies {of_bodies:?}", share(&count));
         // Where gains are unknown too, the scale leans on the file, whose bodies the true ones exceed on the average.
         let least = match (counted, case.bodies || case.gains) {
