@@ -19,7 +19,7 @@ pub struct Deviations {
     pub covariance: Mat,
     /// Covariance of the same parameters by what is known beforehand and may be off by its own deviation: no block of the readings shows that.
     pub by_knowledge: Mat,
-    /// Covariance of the same parameters by the model alone if what is known beforehand were [`WEAKER`] times as far off: small where the readings themselves tell.
+    /// Covariance of the same parameters by the model alone if what is known beforehand were four times as far off: small where the readings themselves tell.
     pub by_readings: Mat,
     /// Those parameters.
     pub inside: Vec<usize>,
