@@ -11,6 +11,9 @@ pub struct Coordinate {
     pub between_robots: bool,
     /// Whether logs of one robot differ in it.
     pub between_logs: bool,
+    /// Whether a change of it with time, and a log that is out of its spread, say something of the robot: not where logs are free to differ, as
+    /// in what a robot carries.
+    pub watched: bool,
     /// Coordinates of the same kind share their relative spread where there are fewer than [`FEW`] robots (viscous friction of all joints, say).
     pub kind: usize,
 }

@@ -25,14 +25,14 @@ impl FleetFit {
             let robot = robot.as_ref()?;
             Some((r, robot.deviation.as_slice(), robot.deviation_sd.as_slice()))
         });
-        outliers(robots, &self.variances.robots, &self.variances.robot_weights, rate)
+        outliers(robots, &self.variances.robots, (&self.variances.robot_weights, &self.splits.watched), rate)
     }
 
     /// Logs out of the spread of their robot, alike.
     pub fn log_outliers(&self, rate: f64) -> Vec<Outlier> {
         let logs = self.logs.iter().enumerate();
         let logs = logs.map(|(l, log)| (l, log.deviation.as_slice(), log.deviation_sd.as_slice()));
-        outliers(logs, &self.variances.logs, &self.variances.log_weights, rate)
+        outliers(logs, &self.variances.logs, (&self.variances.log_weights, &self.splits.watched), rate)
     }
 }
 
@@ -40,10 +40,10 @@ impl FleetFit {
 fn outliers<'a>(
     units: impl Iterator<Item = (usize, &'a [f64], &'a [f64])>,
     variances: &[f64],
-    weights: &[Vec<f64>],
+    (weights, watched): (&[Vec<f64>], &[bool]),
     rate: f64,
 ) -> Vec<Outlier> {
-    let q = variances.len() as f64;
+    let q = watched.iter().filter(|w| **w).count() as f64;
     let left_in = |k: usize| weights.iter().filter(|own| own[k] > LEFT_OUT).count();
     let kept: Vec<f64> = (0..variances.len()).map(|k| (left_in(k) as f64 - 1.0).max(1.0)).collect();
     let mut number = 0;
@@ -53,7 +53,7 @@ fn outliers<'a>(
         number += 1;
         let first = found.len();
         for (coordinate, variance) in
-            variances.iter().enumerate().filter(|(k, _)| weights[unit][*k] <= LEFT_OUT)
+            variances.iter().enumerate().filter(|(k, _)| watched[*k] && weights[unit][*k] <= LEFT_OUT)
         {
             let z = deviation[coordinate] / (variance + sd[coordinate] * sd[coordinate]).sqrt();
             // The spread comes from the units that were left in: Student's t, not the normal law.

@@ -24,6 +24,8 @@ pub(crate) struct Splits {
     pub(crate) order: Vec<usize>,
     pub(crate) q: usize,
     pub(crate) covariates: usize,
+    /// Per coordinate: [`crate::Coordinate::watched`].
+    pub(crate) watched: Vec<bool>,
     /// Per log.
     pub(crate) logs: Vec<LogSplit>,
     /// Per robot: its logs in the order of their keys.
@@ -63,6 +65,7 @@ impl Splits {
             order,
             q,
             covariates: fleet.covariates,
+            watched: fleet.varying.iter().map(|v| v.watched).collect(),
             logs,
             by_robot,
             lower,

@@ -136,6 +136,30 @@ impl<'a> Sweep<'a> {
 
     /// The deviation of a log from its robot.
     pub(crate) fn log(&self, k: usize, robot: &RobotState) -> Deviation {
+        self.log_with_map(k, robot).0
+    }
+
+    /// The deviation of a log from its robot, and the variances of the values `f + b + Γ u + c` of its coordinates: what the log itself tells
+    /// does not hang on how well its robot is known.
+    pub(crate) fn log_and_values(&self, k: usize, robot: &RobotState) -> (Deviation, Vec<f64>) {
+        let (deviation, map) = self.log_with_map(k, robot);
+        let q = self.splits.q;
+        // E of the coordinates at the log's covariates: v = E x + c, c = -M x + ..., so that the covariance is (E - M) C (E - M)ᵀ + `given`.
+        let covariates = &self.splits.logs[k].covariates;
+        let places: Vec<(usize, f64)> = std::iter::once((0, 1.0))
+            .chain(covariates.iter().enumerate().map(|(c, u)| (q + c * q, *u)))
+            .collect();
+        let variance = |i: usize| {
+            let above = places.iter().flat_map(|(a, u)| places.iter().map(move |(b, v)| (a, b, u * v)));
+            let above: f64 = above.map(|(a, b, w)| w * robot.covariance[(a + i, b + i)]).sum();
+            let shared: f64 = places.iter().map(|(a, u)| u * map[(i, a + i)]).sum();
+            (above - 2.0 * shared + deviation.added[(i, i)] + deviation.given[(i, i)]).max(0.0)
+        };
+        let variances = (0..q).map(variance).collect();
+        (deviation, variances)
+    }
+
+    fn log_with_map(&self, k: usize, robot: &RobotState) -> (Deviation, Mat) {
         let rows = self.splits.with_slopes(&self.logs[k], &self.splits.logs[k].covariates);
         deviation(
             rows.view(),
@@ -144,7 +168,6 @@ impl<'a> Sweep<'a> {
             &robot.values,
             &robot.covariance,
         )
-        .0
     }
 
     /// Largest information on every coordinate that one robot has, and one log.

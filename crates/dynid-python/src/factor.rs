@@ -24,12 +24,18 @@ impl Factor {
         estimate: PyRef<'_, Estimate>,
         logs: Vec<PyRef<'_, Log>>,
         delays: bool,
+        payload: Option<String>,
     ) -> PyResult<Self> {
         let found = estimate.found(py, "reduce")?.clone();
         let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
         let reduction = crate::work::run(py, None, 0, move |_| {
             let recipe = found.recipe()?;
-            let reducer = if delays { recipe.with_delays() } else { recipe }.reducer()?;
+            let recipe = if delays { recipe.with_delays() } else { recipe };
+            let recipe = match &payload {
+                Some(link) => recipe.with_payload(link)?,
+                None => recipe,
+            };
+            let reducer = recipe.reducer()?;
             let logs =
                 logs.iter().map(|log| log.of(&reducer.robot().axes, false)).collect::<Result<Vec<_>, _>>()?;
             Reduction::of(&reducer, logs)

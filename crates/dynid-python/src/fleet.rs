@@ -228,7 +228,7 @@ impl Fleet {
         let solved = || {
             let of_type = self.found.type_model(&self.file)?;
             let model = match robot {
-                Some(robot) => self.found.robot_model(robot, &of_type)?,
+                Some(robot) => self.found.robot_model(&self.file, robot, &of_type)?,
                 None => of_type,
             };
             Estimate::new(self.found.estimate(&model), Some(model), None)

@@ -154,6 +154,18 @@ def test_what_to_record_next() -> None:
         dynid.next_motion(arm, so_far, {"elbow.fc": "much"}, **asked)
 
 
+def test_logs_that_may_carry_something_else() -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=5, rate_hz=200, seed=1)
+    link = [f"fore.{symbol}" for symbol in "m mx my mz Ixx Ixy Ixz Iyy Iyz Izz".split()]
+    factor = dynid.identify(arm, made.log, preferred=link).reduce(made.log, payload="fore")
+    assert b'"payload":"fore"' in factor.to_bytes()
+    with pytest.raises(dynid.SettingError, match="`preferred`: expected `fore.m`"):
+        dynid.identify(arm, made.log).reduce(made.log, payload="fore")
+    with pytest.raises(dynid.SettingError, match="expected a moving link: .*found gripper"):
+        dynid.identify(arm, made.log, preferred=link).reduce(made.log, payload="gripper")
+
+
 def test_a_robot_that_runs() -> None:
     arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
     made = dynid.simulate(arm, duration_s=60, rate_hz=200, seed=1)

@@ -20,12 +20,13 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 39] = [
+const ORDER: [&str; 40] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
     CheckName::Recipe.word(),
     FLEET,
+    PAYLOAD,
     CheckName::EffortScale.word(),
     CheckName::ValidationFit.word(),
     CheckName::TrainingFit.word(),
@@ -66,6 +67,8 @@ const ORDER: [&str; 39] = [
 const FINDING: &str = "finding";
 /// What a fleet says of its type, or of the robot.
 pub const FLEET: &str = "fleet";
+/// What a link carried that is not its own.
+pub const PAYLOAD: &str = "payload of logs";
 /// Friction that drives the motion, or rises from rest.
 pub const FRICTION: &str = "identified friction";
 /// Known friction and its range.

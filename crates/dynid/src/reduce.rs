@@ -6,7 +6,7 @@ use dynid_logs::MappingSpec;
 
 pub use dynid_identify::reduction::{
     Column, FactorFileFault, LogFacts, Recipe, ReducedLog, Reducer, Reduction, ReductionError, VERSION,
-    WindowSettings,
+    WindowSettings, check_payload_link, payload_columns,
 };
 
 use crate::Error;
@@ -25,16 +25,39 @@ pub struct Learned {
     pub estimate: Estimate,
 }
 
-/// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it. `delays`: whether factors get
-/// columns for the rest of delays ([`Recipe::with_delays`]).
+/// What logs of a recipe may differ in, each by itself.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OwnOfLogs {
+    /// Whether factors get columns for the rest of delays ([`Recipe::with_delays`]).
+    pub delays: bool,
+    /// Link on which every log may carry something else ([`Recipe::with_payload`]).
+    pub payload: Option<String>,
+}
+
+/// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it.
 ///
 /// # Errors
 /// As [`crate::identify()`], [`Identification::recipe`] and [`Reducer::reduce`].
-pub fn learn(config: &Config, delays: bool, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
+pub fn learn(config: &Config, own: &OwnOfLogs, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
+    let mut config = config.clone();
+    if let Some(link) = &own.payload {
+        check_payload_link(&config.read_robot()?, link)?;
+        // The columns of the link come first, so that they are kept.
+        let mut preferred = payload_columns(link);
+        preferred.extend(
+            config.preferred.iter().filter(|name| !preferred.contains(name)).cloned().collect::<Vec<_>>(),
+        );
+        config.preferred = preferred;
+    }
+    let config = &config;
     let run = identify(config, progress)?;
     let reading = ReadingRecord { understood: Vec::new(), ..run.reading.clone() };
     let recipe = run.recipe()?.with_reading(reading);
-    let recipe = if delays { recipe.with_delays() } else { recipe };
+    let recipe = if own.delays { recipe.with_delays() } else { recipe };
+    let recipe = match &own.payload {
+        Some(link) => recipe.with_payload(link)?,
+        None => recipe,
+    };
     let estimate = run.estimate();
     // Samples go before they are read once more.
     drop(run);

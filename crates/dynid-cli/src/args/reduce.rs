@@ -37,6 +37,9 @@ pub(crate) struct ReduceArgs {
     /// and change.
     #[arg(long, conflicts_with = "manifest")]
     pub(crate) delays: bool,
+    /// Where a recipe is learned: every log may carry something else on this link, so that a fleet tells what logs carry from what robots are.
+    #[arg(long, value_name = "LINK", conflicts_with = "manifest")]
+    pub(crate) payload: Option<String>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
     #[command(flatten)]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynid::fleet::{
-    ChangeRecord, FactorStore, FleetFile, FleetSettings, FleetStep, Outcome, RobotRecord, StoreReading,
-    fleet, manifest,
+    CarriedByLog, ChangeRecord, FactorStore, FleetFile, FleetSettings, FleetStep, Outcome, PayloadRecord,
+    RobotRecord, StoreReading, fleet, manifest,
 };
 use dynid::{Identification, reduce};
 use dynid_terminal::message::{Failure, Notes, data, json};
@@ -104,7 +104,7 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
     let type_page = dynid::report_page(&of_type, &estimate)?;
     let with_pages: Vec<&RobotRecord> =
         file.robots.iter().filter(|r| pages.iter().any(|(name, _)| *name == r.name)).collect();
-    let models = found.robot_models(&with_pages, &of_type)?;
+    let models = found.robot_models(&file, &with_pages, &of_type)?;
     let of_robots: Vec<(PathBuf, String)> = (pages.into_iter().zip(&models))
         .flat_map(|((name, page), model)| {
             let at = |kind: &str| args.out.join("robots").join(format!("{}.{kind}", file_name(&name)));
@@ -151,6 +151,31 @@ fn with_deviation(size: f64, sd: f64) -> String {
     format!("{size:+.decimals$} ± {sd:.decimals$}")
 }
 
+/// What logs carried, by the first parameter of their link: the mass where efforts tell it.
+fn carried(payload: &PayloadRecord) -> String {
+    let Some(first) = payload.parameters.first() else {
+        return format!("carried on {}: no effort tells anything of it\n", payload.link);
+    };
+    let sorted = |of: fn(&CarriedByLog) -> f64| {
+        let mut all: Vec<f64> = payload.logs.iter().map(of).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let (differences, sds) = (sorted(|log| log.difference[0]), sorted(|log| log.sd[0]));
+    match (differences.first(), differences.last(), sds.get(sds.len() / 2)) {
+        (Some(least), Some(most), Some(sd)) => format!(
+            "carried on {}: {} of single logs {} to {} {} from the mean of all, ± {} each\n",
+            payload.link,
+            first.name,
+            table::number(Some(*least)),
+            table::number(Some(*most)),
+            first.unit,
+            table::number(Some(*sd)),
+        ),
+        _ => String::new(),
+    }
+}
+
 fn summary(file: &FleetFile) -> String {
     let changed: Vec<(&RobotRecord, &ChangeRecord)> =
         file.robots.iter().flat_map(|r| r.changes.iter().map(move |c| (r, c))).collect();
@@ -181,5 +206,6 @@ fn summary(file: &FleetFile) -> String {
     for failure in file.failures.iter().take(PRINTED) {
         out += &format!("failed: {} ({}): {}\n", failure.log, failure.robot, failure.message);
     }
+    out += &file.payload.as_ref().map(carried).unwrap_or_default();
     out + &format!("{}: {}\n", file.status, file.headline)
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use dynid::config::Config;
 use dynid::estimate::{Estimate, Status, Verdict};
 use dynid::preflight::Severity;
-use dynid::reduce::{self, Learned, Reduction};
+use dynid::reduce::{self, Learned, OwnOfLogs, Reduction};
 use dynid_terminal::message::{Failure, Notes, data, json};
 use dynid_terminal::outputs::{self, Outputs};
 use dynid_terminal::progress::Progress;
@@ -32,14 +32,21 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
             "`dynid merge` and `dynid solve` take factor files alone",
         ));
     }
-    if args.delays && follows {
-        return Err(Failure::Usage(
-            format!(
-                "--delays: expected a robot file or a configuration, found the recipe of {}",
-                args.input.display()
-            ),
+    let learned = [
+        (
+            "--delays",
+            args.delays,
             "a recipe has the columns that it was learned with: learn it with `--delays`",
-        ));
+        ),
+        (
+            "--payload",
+            args.payload.is_some(),
+            "a recipe has the columns that it was learned with: learn it with `--payload`",
+        ),
+    ];
+    if let Some((flag, _, hint)) = learned.iter().find(|(_, given, _)| *given && follows) {
+        let expected = "expected a robot file or a configuration, found the recipe of";
+        return Err(Failure::Usage(format!("{flag}: {expected} {}", args.input.display()), hint));
     }
     if let Some(config) = args.reading.config.as_ref().filter(|_| !follows) {
         return Err(Failure::Usage(
@@ -65,8 +72,8 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
         let logs = GivenLogs { paths: &args.log, rows: args.reading.rows };
         let mut config: Config = configuration(&args.input, &logs, notes)?;
         apply_log_args_to(&mut config, &args.reading.columns);
-        let Learned { reduction, estimate } =
-            reduce::learn(&config, args.delays, &mut |step| progress.step(step))?;
+        let own = OwnOfLogs { delays: args.delays, payload: args.payload.clone() };
+        let Learned { reduction, estimate } = reduce::learn(&config, &own, &mut |step| progress.step(step))?;
         (reduction, Some(estimate.verdict))
     };
     drop(progress);

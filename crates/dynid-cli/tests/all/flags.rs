@@ -321,7 +321,7 @@ fn cases() -> Vec<Case> {
             &["--covariates temperature", "--quiet"],
         ),
         ("fleet", "fleet factors --out mine", &["--force"]),
-        ("reduce", "reduce arm.urdf --log log.csv --out f.factors", &["--delays"]),
+        ("reduce", "reduce arm.urdf --log log.csv --out f.factors", &["--delays", "--payload forearm"]),
         (
             "inspect",
             "inspect arm.urdf",

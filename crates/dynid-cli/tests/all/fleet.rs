@@ -270,6 +270,90 @@ fn delays_that_change_are_found() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("learn it with `--delays`"));
 }
 
+/// Logs in which a robot carries what nobody stated: what it was is told to its deviation, and friction that changes is found beside it; by a recipe
+/// that knows of no payload it is not.
+#[test]
+fn what_logs_carry_is_told_and_hides_no_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("arm.urdf"), TWO_LINKS).unwrap();
+    let settings =
+        "duration_s = 6\nrate_hz = 100\n[fleet]\nrobots = 10\nlogs = 12\nwear = 1\nfaults = 1\npayload = 1\n";
+    std::fs::write(at.join("fleet.toml"), settings).unwrap();
+    run(
+        at,
+        &["simulate", "arm.urdf", "--config", "fleet.toml", "--seed", "4", "--out", "made", "--quiet"],
+        0,
+    );
+    let truth = read(&at.join("made/truth.json"));
+    let carried = |log: &str| {
+        let logs = truth["logs"].as_array().unwrap();
+        let log = log.rsplit('/').next().unwrap();
+        let found = logs.iter().find(|l| l["file"].as_str().unwrap().starts_with(log)).unwrap();
+        found["payload"].as_f64().unwrap_or(0.0)
+    };
+    let logs = ["--log", "made/logs/r001-001.csv.gz", "--log", "made/logs/r001-002.csv.gz"];
+    let fitted = |flags: &[&str], name: &str| {
+        let recipe = format!("{name}.factors");
+        run(at, &[&["reduce", "arm.urdf", "--out", &recipe, "--quiet"], flags, &logs[..]].concat(), 0);
+        run(at, &["reduce", &recipe, "--manifest", "made/manifest.csv", "--out", name, "--quiet"], 0);
+        let out = format!("{name}-fleet");
+        run(at, &["fleet", name, "--out", &out, "--quiet"], 0);
+        read(&at.join(out).join("fleet.json"))
+    };
+    let told = |fleet: &Value| {
+        let robots = fleet["robots"].as_array().unwrap();
+        let is_told = |change: &&Value| {
+            let robot = robots.iter().find(|r| r["name"] == change["robot"]).unwrap();
+            robot["changes"][0]["parameter"] == change["parameter"]
+        };
+        truth["changes"].as_array().unwrap().iter().filter(is_told).count()
+    };
+    let found = fitted(&["--payload", "forearm"], "with");
+    assert_eq!(told(&found), 2, "{}", found["headline"]);
+    assert_eq!(found["logs_to_look_at"], Value::Array(Vec::new()));
+    let payload = &found["payload"];
+    assert_eq!(
+        (&payload["link"], &payload["parameters"][0]["name"]),
+        (&"forearm".into(), &"forearm.m".into())
+    );
+    let of_logs = payload["logs"].as_array().unwrap();
+    assert_eq!(of_logs.len(), 120);
+    let mean = of_logs.iter().map(|l| carried(l["log"].as_str().unwrap())).sum::<f64>() / 120.0;
+    let (mut held, mut squares) = (0, 0.0);
+    for log in of_logs {
+        let off = log["difference"][0].as_f64().unwrap() - (carried(log["log"].as_str().unwrap()) - mean);
+        let sd = log["sd"][0].as_f64().unwrap();
+        assert!(sd < 0.03, "{log}");
+        held += usize::from(off.abs() < 1.96 * sd);
+        squares += off * off / 120.0;
+    }
+    // Slow logs of six seconds smear the sign of the shoulder's friction beyond what their noise says.
+    assert!(held >= 96 && squares < 0.02 * 0.02, "{held} of 120 intervals hold, {} kg", squares.sqrt());
+    let of_type = read(&at.join("with-fleet/type.json"));
+    let cautions = of_type["verdict"]["cautions"].as_array().unwrap();
+    assert!(cautions.iter().any(|c| c["name"] == "payload of logs"), "{cautions:?}");
+    assert!(
+        std::fs::read_to_string(at.join("with-fleet/report.html")).unwrap().contains("Carried on forearm")
+    );
+    run(at, &["export", "with-fleet/type.json", "--mjcf", "type.xml", "--quiet"], 0);
+    run(at, &["solve", "with.factors", "--out", "solved", "--quiet"], 0);
+    let solved = read(&at.join("solved/estimate.json"));
+    assert!(solved["verdict"]["cautions"].to_string().contains("taken for one"), "{}", solved["verdict"]);
+
+    let without = fitted(&[], "without");
+    assert_eq!(told(&without), 0, "{}", without["headline"]);
+    assert!(without["warnings"].to_string().contains("--payload LINK"), "{}", without["warnings"]);
+
+    let refused = |args: &[&str], part: &str| {
+        let output = run(at, &[args, &logs[..], &["--out", "x.factors"]].concat(), 2);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(text.contains(part), "{text}");
+    };
+    refused(&["reduce", "with.factors", "--payload", "forearm"], "learn it with `--payload`");
+    refused(&["reduce", "arm.urdf", "--payload", "gripper"], "a moving link: `upper_arm`, `forearm`");
+}
+
 /// Who bears more false alarms is told of more robots.
 #[test]
 fn the_rate_of_false_discoveries_decides_who_is_named() {

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use dynid_identify::Error;
 use dynid_identify::reduction::DELAY;
 use dynid_identify::robot::Robot;
+use dynid_model::inertia::PARAMETER_NAMES;
+use dynid_model::{Inertia, Mat3, Vec3};
 use dynid_motion::shift::shift;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,6 +27,10 @@ const TEMPERATURE: f64 = 25.0;
 const OUTLIER: f64 = 8.0;
 /// Spread of delays between robots and between logs, samples.
 const DELAY_SPREAD: (f64, f64) = (0.1, 0.03);
+/// Distance of the middle of a payload from the axes of its link at most, m.
+const PAYLOAD_REACH: f64 = 0.08;
+/// Radius of gyration of a payload about its middle, m.
+const PAYLOAD_RADIUS: f64 = 0.04;
 /// Deviation of a broken log, in standard deviations of its robot's logs.
 const BROKEN: f64 = 15.0;
 
@@ -75,6 +81,9 @@ pub struct VirtualLog {
     pub broken: Option<String>,
     /// Parameters of the joints in this log.
     pub parameters: BTreeMap<String, f64>,
+    /// Mass that the last link carries, kg; absent if it carries nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<f64>,
 }
 
 fn normal(rng: &mut impl Rng) -> f64 {
@@ -272,7 +281,20 @@ impl VirtualFleet {
         }
         let file = format!("{robot}-{:03}.csv.gz", l + 1);
         let temperature = Some(temperature).filter(|_| season > 0.0);
-        VirtualLog { robot, file, start_s, temperature, broken, parameters }
+        let payload = self.payload(r, l).map(|body| body.0[0]);
+        VirtualLog { robot, file, start_s, temperature, broken, parameters, payload }
+    }
+
+    /// What the last link carries in a log, about the frame of its joint.
+    fn payload(&self, r: usize, l: usize) -> Option<Inertia> {
+        let mut rng = self.rng(&format!("payload {r} {l}"));
+        let carries = self.table.payload > 0.0 && rng.random_bool(0.5);
+        carries.then(|| {
+            let mass = self.table.payload * rng.random_range(0.1..1.0);
+            let com = std::array::from_fn(|_| PAYLOAD_REACH * rng.random_range(-1.0..1.0));
+            let about_com = Mat3::identity() * (mass * PAYLOAD_RADIUS * PAYLOAD_RADIUS);
+            Inertia::from_com(mass, Vec3(com), &about_com)
+        })
     }
 
     fn value(&self, parameter: &str) -> f64 {
@@ -295,6 +317,14 @@ impl VirtualFleet {
         let mut values = self.settings.values.clone();
         let is_delay = |parameter: &String| parts(parameter).1 == DELAY;
         values.extend(parameters.iter().filter(|(p, _)| !is_delay(p)).map(|(p, v)| (p.clone(), *v)));
+        let carried = self.payload(index / self.table.logs, index % self.table.logs);
+        if let (Some(Inertia(carried)), Some(last)) = (carried, robot.mechanism.sweep().last().copied()) {
+            let link = &robot.mechanism.bodies()[last].name;
+            for (symbol, more) in PARAMETER_NAMES.iter().zip(carried) {
+                let parameter = format!("{link}.{symbol}");
+                *values.entry(parameter.clone()).or_insert_with(|| self.value(&parameter)) += more;
+            }
+        }
         let settings = SimulateSettings { values, seed, fleet: None, ..self.settings.clone() };
         let mut log = simulate(robot, &settings)?;
         for (parameter, delay) in parameters.iter().filter(|(p, _)| is_delay(p)) {

@@ -35,6 +35,8 @@ pub struct FleetTable {
     /// Robots in which the delay of the motion behind the effort of a joint grows at once by 0.3 to 1 samples. The delays of all joints then differ
     /// by 0.1 samples between robots, and by 0.03 between logs. Default 0.
     pub delays: usize,
+    /// Largest mass that the last link carries, kg: in half of the logs nothing, in the others a body of a mass of its own, up to this one. Default 0.
+    pub payload: f64,
     /// Share of the logs in which one joint is off by 15 standard deviations. Default 0.
     pub broken: f64,
 }
@@ -54,6 +56,7 @@ impl Default for FleetTable {
             wear: 0,
             faults: 0,
             delays: 0,
+            payload: 0.0,
             broken: 0.0,
         }
     }
@@ -78,8 +81,11 @@ impl FleetTable {
             }
         }
         let spreads = self.between_robots.values().chain(self.between_logs.values());
-        let numbers =
-            [("fleet.days", self.days, self.days > 0.0), ("fleet.season", self.season, self.season >= 0.0)];
+        let numbers = [
+            ("fleet.days", self.days, self.days > 0.0),
+            ("fleet.season", self.season, self.season >= 0.0),
+            ("fleet.payload", self.payload, self.payload >= 0.0),
+        ];
         let shares = [("fleet.broken", self.broken, (0.0..=1.0).contains(&self.broken))];
         let spreads = spreads.map(|x| ("fleet.between_robots", *x, *x >= 0.0));
         let slopes = self.per_kelvin.values().map(|x| ("fleet.per_kelvin", *x, true));

@@ -35,6 +35,16 @@ impl<'a> Logs<'a> {
         self.sweep.splits.q
     }
 
+    /// Number of coordinates whose changes are told.
+    pub(crate) fn watched(&self) -> usize {
+        self.sweep.splits.watched.iter().filter(|w| **w).count()
+    }
+
+    /// Whether changes of a coordinate are told.
+    pub(crate) fn is_watched(&self, k: usize) -> bool {
+        self.sweep.splits.watched[k]
+    }
+
     /// Weights of the logs where nothing changes.
     pub(crate) fn weights(&self) -> Vec<Vec<f64>> {
         self.index.iter().map(|k| self.sweep.variances.log_weights[*k].clone()).collect()

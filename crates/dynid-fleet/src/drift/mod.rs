@@ -219,13 +219,13 @@ struct Tests<'a> {
 
 impl Tests<'_> {
     fn told(&self, settings: &DriftSettings) -> bool {
-        self.logs.index.len() >= settings.least_logs && self.logs.span_s > 0.0 && self.logs.coordinates() > 0
+        self.logs.index.len() >= settings.least_logs && self.logs.span_s > 0.0 && self.logs.watched() > 0
     }
 
     /// `p` of the evidence for one coordinate of several: Bonferroni over them.
     fn p(&self, evidence: f64) -> f64 {
         let single = probability(evidence.max(0.0), self.logs.index.len());
-        (self.logs.coordinates() as f64 * single).min(1.0)
+        (self.logs.watched() as f64 * single).min(1.0)
     }
 
     /// Weights of the logs beside patterns, from some to start with, and the misfit that is left.
@@ -254,7 +254,8 @@ impl Tests<'_> {
         };
         let candidates: Vec<Candidate> = (0..self.logs.coordinates()).filter_map(best).collect();
         let statistics: Vec<f64> = candidates.iter().map(|c| c.statistic).collect();
-        let k = (0..candidates.len()).max_by(|a, b| statistics[*a].total_cmp(&statistics[*b])).unwrap_or(0);
+        let watched = (0..candidates.len()).filter(|k| self.logs.is_watched(*k));
+        let k = watched.max_by(|a, b| statistics[*a].total_cmp(&statistics[*b])).unwrap_or(0);
         (k, candidates[k], statistics)
     }
 
@@ -318,7 +319,7 @@ impl Tests<'_> {
     ) -> RobotHistory {
         let logs = self.logs.index.clone();
         let Some(mut best) = best else {
-            let history = match self.logs.coordinates() {
+            let history = match self.logs.watched() {
                 0 => History::Unchanged { p: 1.0 },
                 _ => History::TooShort { logs: logs.len() },
             };

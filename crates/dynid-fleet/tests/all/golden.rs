@@ -59,7 +59,8 @@ fn fleet(golden: &Value) -> (Fleet, Noise) {
         }
     };
     let logs = golden["factors"].as_array().expect("factors").iter().enumerate().map(log).collect();
-    let coordinate = |column| Coordinate { column, between_robots: true, between_logs: true, kind: column };
+    let coordinate =
+        |column| Coordinate { column, between_robots: true, between_logs: true, watched: true, kind: column };
     let fleet = Fleet {
         columns: 4,
         channels: 2,

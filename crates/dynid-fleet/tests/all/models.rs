@@ -66,6 +66,7 @@ fn made(seed: u64, step: f64) -> Made {
         column: *column,
         between_robots: true,
         between_logs: true,
+        watched: true,
         kind,
     };
     let fleet = Fleet {

@@ -308,6 +308,7 @@ pub(crate) fn simulate(plan: &Plan) -> Simulated {
         column: arm.varying[k],
         between_robots: true,
         between_logs: true,
+        watched: true,
         kind: k % 3,
     };
     let fleet = Fleet {

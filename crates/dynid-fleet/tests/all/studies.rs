@@ -44,7 +44,7 @@ impl Coverage {
 
 #[test]
 fn intervals_hold() {
-    let [mut robots, mut model, mut jackknife, mut new] = [(); 4].map(|()| Coverage::default());
+    let [mut robots, mut logs, mut model, mut jackknife, mut new] = [(); 5].map(|()| Coverage::default());
     let (mut spreads, mut scatters) = (Vec::new(), Vec::new());
     for seed in 0..fleets().unwrap_or(3) {
         let made = simulate(&Plan { seed, ..PLAIN });
@@ -58,6 +58,12 @@ fn intervals_hold() {
             let robot = robot.as_ref().expect("has logs");
             for c in &made.arm.varying {
                 robots.add(robot.values[*c] - truth[*c], 1.96 * robot.covariance[(*c, *c)].sqrt());
+            }
+        }
+        for (l, truth) in made.logs.iter().enumerate() {
+            let values = found.values_of_log(&made.fleet, l).expect("a log of a robot");
+            for (k, c) in made.arm.varying.iter().enumerate() {
+                logs.add(values[*c] - truth[*c], 1.96 * found.logs[l].value_sd[k]);
             }
         }
         let by_robots = found.jackknife.as_ref().expect("robots");
@@ -75,9 +81,10 @@ fn intervals_hold() {
     }
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     println!(
-        "robots {:.1} %, new robots {:.1} %; shared by the jackknife {:.1} %, by the model {:.1} %; spread over the true one {:.3} between robots, \
+        "robots {:.1} %, logs {:.1} %, new robots {:.1} %; shared by the jackknife {:.1} %, by the model {:.1} %; spread over the true one {:.3} between robots, \
          {:.3} between logs",
         robots.percent(),
+        logs.percent(),
         new.percent(),
         jackknife.percent(),
         model.percent(),
@@ -85,12 +92,48 @@ fn intervals_hold() {
         mean(&scatters)
     );
     assert!((93.0..=97.0).contains(&robots.percent()));
+    assert!((93.0..=97.0).contains(&logs.percent()), "{}", logs.percent());
     // 108 shared intervals and 54 of new robots: three standard deviations of their counts below 95 %.
     assert!(jackknife.percent() > 88.0 && new.percent() > 85.0);
     assert!((mean(&spreads) - 1.0).abs() < 0.1 && (mean(&scatters) - 1.0).abs() < 0.1);
 }
 
 /// Logs of one robot of a fleet.
+/// What logs are free to differ in is neither a change of the robot nor a log to look at, and hides no change of what is watched.
+#[test]
+fn what_is_not_watched_is_not_named() {
+    let plan = Plan { robots: 30, logs: 20, seed: 4, broken: 0.02, faults: 4, ..PLAIN };
+    let mut made = simulate(&plan);
+    let named = |made: &Simulated| {
+        let found = fit(&made.fleet, &FitSettings::default()).expect("fits");
+        let robots = drift(&made.fleet, &found, &DriftSettings::default()).expect("dates").robots;
+        let of_robot = |history: &History| match history {
+            History::Changed { changes, .. } => changes.iter().map(|c| c.coordinate).collect(),
+            _ => Vec::new(),
+        };
+        let changed: Vec<Vec<usize>> = robots.iter().map(|robot| of_robot(&robot.history)).collect();
+        let odd: Vec<usize> = found.log_outliers(0.05).iter().map(|o| o.coordinate).collect();
+        (changed, odd)
+    };
+    let told = |changed: &[Vec<usize>], made: &Simulated, watched: &[bool]| {
+        let put_in = made.changes.iter().filter(|c| watched[c.coordinate]);
+        put_in.filter(|c| changed[c.robot].contains(&c.coordinate)).count()
+    };
+    let all = vec![true; made.fleet.varying.len()];
+    let (changed, odd) = named(&made);
+    assert_eq!(told(&changed, &made, &all), 4);
+    let joint = made.changes[0].coordinate / 3;
+    let is_watched: Vec<bool> = (0..all.len()).map(|k| k / 3 != joint).collect();
+    assert!(odd.iter().any(|k| !is_watched[*k]), "{odd:?}");
+    for (coordinate, watched) in made.fleet.varying.iter_mut().zip(&is_watched) {
+        coordinate.watched = *watched;
+    }
+    let others = made.changes.iter().filter(|c| is_watched[c.coordinate]).count();
+    let (changed, odd) = named(&made);
+    assert!(others < 4 && told(&changed, &made, &all) == others, "{changed:?}");
+    assert!(changed.iter().flatten().chain(&odd).all(|k| is_watched[*k]), "{changed:?} {odd:?}");
+}
+
 fn alone(fleet: &Fleet, robots: &[usize]) -> Fleet {
     let place = |r: usize| robots.iter().position(|own| *own == r);
     let logs = fleet.logs.iter().filter_map(|log| Some(FleetLog { robot: place(log.robot)?, ..log.clone() }));

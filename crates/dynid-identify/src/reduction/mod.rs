@@ -46,7 +46,7 @@ pub use crate::reduction_error::{FactorFileFault, ReductionError};
 pub use crate::trained_log::{RowFit, TrainedLog};
 pub use file::VERSION;
 pub use pooled::Pooled;
-pub use recipe::{Blocks, Choices, Column, DELAY, Output, Recipe};
+pub use recipe::{Blocks, Choices, Column, DELAY, Output, Recipe, check_payload_link, payload_columns};
 pub use reduce::{Reducer, WindowSettings};
 
 /// What is left of a log: its factors, and what has to be known of it.

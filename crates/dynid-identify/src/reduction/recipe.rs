@@ -5,6 +5,7 @@ use std::path::Path;
 
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
+use dynid_model::inertia::PARAMETER_NAMES;
 use dynid_model::{EffortModel, Owner, Parameter, RobotModel};
 use dynid_motion::cutoff::KernelLimit;
 use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
@@ -72,6 +73,9 @@ pub struct Recipe {
     /// Whether factors have a column per output for the rest of its delay, behind the others.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     delays: bool,
+    /// Link whose parameters are columns of their own, since every log may carry something else on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    payload: Option<String>,
     /// Checks of the identification behind it that did not pass and that factors cannot repeat.
     pub doubts: Vec<CheckResult>,
 }
@@ -291,6 +295,7 @@ impl Identification {
                 .collect(),
             reading: ReadingRecord::default(),
             delays: false,
+            payload: None,
             doubts: doubts(self),
             model,
         })
@@ -309,6 +314,23 @@ fn doubts(id: &Identification) -> Vec<CheckResult> {
     let verdict = verdict::judge(id);
     let is_doubt = |c: &CheckResult| c.status != Status::Ok && kept.contains(&c.name);
     verdict.checks.into_iter().filter(is_doubt).collect()
+}
+
+/// Refuses what is no moving link of a robot.
+///
+/// # Errors
+/// [`Error::Setting`] with the links that there are.
+pub fn check_payload_link(robot: &Robot, link: &str) -> Result<(), Error> {
+    let names: Vec<&str> = robot.mechanism.bodies().iter().map(|body| body.name.as_str()).collect();
+    match names.contains(&link) {
+        true => Ok(()),
+        false => Err(Error::setting("payload", &format!("a moving link: `{}`", names.join("`, `")), link)),
+    }
+}
+
+/// Names of the parameters of a link, which what it carries adds to.
+pub fn payload_columns(link: &str) -> Vec<String> {
+    PARAMETER_NAMES.iter().map(|symbol| format!("{link}.{symbol}")).collect()
 }
 
 fn not_reduced(what: &str, instead: &str) -> Error {
@@ -337,6 +359,31 @@ impl Recipe {
     /// Whether factors have columns for the rest of delays.
     pub fn has_delays(&self) -> bool {
         self.delays
+    }
+
+    /// Returns the recipe for logs each of which may carry a body of its own on a link: a fleet then takes the parameters of the link for different in
+    /// every log.
+    ///
+    /// What a link carries acts as the link does, so that no column is added; the columns of the link have to be columns of the recipe by
+    /// themselves, which they are where the identification was asked to keep them ([`payload_columns`], the setting `preferred`).
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for what is no moving link, and for an identification that did not keep its columns.
+    pub fn with_payload(self, link: &str) -> Result<Self, Error> {
+        let (problem, _) = self.problem()?;
+        check_payload_link(&problem.robot, link)?;
+        let wanted = payload_columns(link);
+        match wanted.iter().all(|name| self.settings.preferred.contains(name)) {
+            true => Ok(Recipe { payload: Some(link.to_owned()), ..self }),
+            false => {
+                Err(Error::setting("preferred", &format!("`{}`", wanted.join("`, `")), "not all of them"))
+            }
+        }
+    }
+
+    /// The link on which every log may carry something else.
+    pub fn payload(&self) -> Option<&str> {
+        self.payload.as_deref()
     }
 
     /// Columns of factors: [`Recipe::columns`], and where they have them those of the rest of delays, a sample in size.

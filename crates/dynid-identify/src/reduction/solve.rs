@@ -7,6 +7,7 @@ use dynid_factor::groups::ReducedGroup;
 use super::recipe::{Solved, training_log};
 use super::{LogFacts, Recipe, ReducedLog, Reduction, ReductionError};
 use crate::Error;
+use crate::caution::{self, Caution};
 use crate::consistency::{self, Consistent};
 use crate::finding::Finding;
 use crate::fitting::{self, Fitted, RowResiduals};
@@ -71,7 +72,10 @@ impl Reduction {
             findings,
             overlaps: Overlaps::default(),
             own_delays: Vec::new(),
-            warnings: facts().flat_map(|facts| facts.cautions.iter().cloned()).collect(),
+            warnings: facts()
+                .flat_map(|facts| facts.cautions.iter().cloned())
+                .chain(self.carried())
+                .collect(),
             reading: Vec::new(),
             comparison: None,
         };
@@ -89,6 +93,16 @@ impl Reduction {
         out.explained = samples.into_iter().zip(rows_explained).map(|(held, rows)| held && rows).collect();
         out.judge(&left)?;
         Ok(out)
+    }
+}
+
+impl Reduction {
+    /// Logs that may carry different bodies are solved as if they carried one.
+    fn carried(&self) -> Option<Caution> {
+        let link = self.recipe.payload().filter(|_| self.logs.len() > 1)?;
+        let message = format!("the logs may carry different bodies on `{link}`, which are taken for one");
+        let remedy = "`dynid fleet` tells what every log carried; or reduce by a recipe that was learned without `--payload`";
+        Some(Caution::warn(caution::PAYLOAD, message, remedy))
     }
 }
 

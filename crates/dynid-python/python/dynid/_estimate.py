@@ -207,12 +207,14 @@ class Estimate:
         (`Robot.from_mujoco`, `Robot.from_pinocchio`)."""
         return _models.apply(self.record, model)
 
-    def reduce(self, logs: LogOrPath | Iterable[LogOrPath], *, delays: bool = False) -> Factor:
+    def reduce(self, logs: LogOrPath | Iterable[LogOrPath], *, delays: bool = False, payload: str | None = None) -> Factor:
         """Reduces logs by the choices of this identification to a `Factor`.
 
         `delays`: with a column per effort for the rest of its delay, log by log, so that a fleet sees how delays differ and change.
+        `payload`: link on which every log may carry something else; the identification has to have kept the parameters of the link as columns,
+        `preferred=[f"{link}.{symbol}" ...]` with the symbols m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
         """
-        return Factor(_native.Factor.of(self._native, native_logs(logs), delays))
+        return Factor(_native.Factor.of(self._native, native_logs(logs), delays, payload))
 
     def __repr__(self) -> str:
         return f"{self._native!r}\n{self.headline}"

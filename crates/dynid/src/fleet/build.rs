@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use dynid_factor::Factor;
 use dynid_files::digest::sha256_bytes;
 use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetError, FleetLog};
-use dynid_identify::reduction::{LogFacts, Origin, ReducedLog};
+use dynid_identify::reduction::{LogFacts, Origin, ReducedLog, payload_columns};
 use dynid_linalg::{AsView, Mat};
 use dynid_model::Owner;
 
@@ -177,15 +177,19 @@ fn varying(recipe: &Recipe, settings: &FleetSettings) -> Result<(Vec<Coordinate>
     };
     let robots: Vec<bool> = listed("between_robots", &settings.between_robots)?.unwrap_or_else(usual);
     let logs = listed("between_logs", &settings.between_logs)?.unwrap_or_else(|| robots.clone());
+    // What logs carry is their own, whatever else they differ in.
+    let carried = recipe.payload().map(payload_columns).unwrap_or_default();
     let symbols: Vec<&String> = symbols.iter().collect();
     let (mut out, mut positive) = (Vec::new(), Vec::new());
     for (column, parameter) in parameters.iter().enumerate() {
-        if robots[column] || logs[column] {
+        let is_carried = carried.contains(&parameter.name);
+        if robots[column] || logs[column] || is_carried {
             let own = symbol(&parameter.name);
             out.push(Coordinate {
                 column,
                 between_robots: robots[column],
-                between_logs: logs[column],
+                between_logs: logs[column] || is_carried,
+                watched: !is_carried,
                 kind: symbols.iter().position(|s| **s == own).unwrap_or_default(),
             });
             positive.push(parameter.lower.is_some_and(|lower| lower >= 0.0));

@@ -28,9 +28,9 @@ pub use manifest::{Entry, date, manifest};
 pub use one_log::{LogReducer, Made, NUMERICS, StoreReading};
 pub use read::{StoreContent, read};
 pub use record::{
-    ChangeKind, ChangeRecord, ChannelRecord, CovariateRecord, DatedRecord, EventRecord, FleetFile,
-    FleetParameter, LogDeviation, LogRecord, OutlierRecord, RobotParameter, RobotRecord, RobotState,
-    SlopeRecord,
+    CarriedByLog, CarriedParameter, ChangeKind, ChangeRecord, ChannelRecord, CovariateRecord, DatedRecord,
+    EventRecord, FleetFile, FleetParameter, LogDeviation, LogRecord, OutlierRecord, PayloadRecord,
+    RobotParameter, RobotRecord, RobotState, SlopeRecord,
 };
 pub use store::{FactorStore, Outcome};
 

@@ -27,6 +27,8 @@ use crate::estimate::Estimate;
 /// Share of its prior weight that a type has in each of its robots: enough to split what base values leave open as it is split in the type
 /// (the solver stops at 1e-6), and too little to draw a second time at what logs tell.
 const SPLIT: f64 = 1e-2;
+/// Logs differ in what they carry where that scatters by so many standard deviations of one log.
+const DIFFERS: f64 = 3.0;
 /// What rounding takes from the smallest eigenvalue of a matrix of correlations at least.
 const ROUNDING: f64 = 1e-12;
 /// Where the pages and records of a fleet tell more.
@@ -56,6 +58,7 @@ impl FleetResult {
         pooled.blocks = said.into_iter().map(of_bodies).collect();
         pooled.covariance = self.without_delays(fit.jackknife.as_ref().unwrap_or(&fit.covariance));
         pooled.cautions.extend(file.warnings.iter().map(|w| Caution::warn(caution::FLEET, w, LOOK)));
+        pooled.cautions.extend(carried(file));
         self.recipe.solve_pooled(pooled)
     }
 
@@ -68,6 +71,7 @@ impl FleetResult {
     /// [`FleetFault::Setting`] for a robot that the fleet does not have; [`Error::Consistency`].
     pub fn robot_model(
         &self,
+        file: &FleetFile,
         robot: &RobotRecord,
         of_type: &Identification,
     ) -> Result<Identification, Error> {
@@ -99,6 +103,7 @@ impl FleetResult {
         let chosen = of_type.consistent.prior_trials.get(of_type.consistent.chosen);
         pooled.prior = chosen.map(|trial| (trial.distance, SPLIT * trial.weight));
         pooled.cautions.extend(reservations(robot));
+        pooled.cautions.extend(carried(file));
         self.recipe.solve_pooled(pooled)
     }
 
@@ -108,10 +113,11 @@ impl FleetResult {
     /// As [`FleetResult::robot_model`].
     pub fn robot_models(
         &self,
+        file: &FleetFile,
         robots: &[&RobotRecord],
         of_type: &Identification,
     ) -> Result<Vec<Identification>, Error> {
-        robots.par_iter().map(|robot| self.robot_model(robot, of_type)).collect()
+        robots.par_iter().map(|robot| self.robot_model(file, robot, of_type)).collect()
     }
 
     /// The result file of a model of this fleet.
@@ -262,6 +268,24 @@ fn reservations(robot: &RobotRecord) -> Vec<Caution> {
         Caution::warn(caution::FLEET, message, "look at the robot and at its logs")
     });
     changed.chain(outside).collect()
+}
+
+/// What logs carried is in the link of a model, in the mean; nothing of it where all carried the same.
+fn carried(file: &FleetFile) -> Option<Caution> {
+    let payload = file.payload.as_ref()?;
+    let differs = |k: usize| {
+        let mut sds: Vec<f64> = payload.logs.iter().map(|log| log.sd[k]).collect();
+        sds.sort_by(f64::total_cmp);
+        payload.parameters[k].between_logs > DIFFERS * sds.get(sds.len() / 2).copied().unwrap_or(0.0)
+    };
+    let link = &payload.link;
+    (0..payload.parameters.len()).any(differs).then(|| {
+        let message = format!("logs carried different bodies on `{link}`: its parameters hold what they carried in the mean");
+        let remedy = format!(
+            "take off what a log that carried nothing has less (`payload` of `fleet.json`), before a file states `{link}` alone"
+        );
+        Caution::warn(caution::PAYLOAD, message, remedy)
+    })
 }
 
 /// Logs as if they were one; `rate_hz`: that at which delays are told.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
 use dynid_fleet::{FEW, Noise};
-use dynid_identify::reduction::DELAY;
+use dynid_identify::reduction::{DELAY, payload_columns};
 use dynid_record::{Basis, Outcome, words};
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +81,9 @@ pub struct FleetFile {
     pub robots: Vec<RobotRecord>,
     /// Logs that stand out from those of their robot.
     pub logs_to_look_at: Vec<LogRecord>,
+    /// What logs carried, where the recipe lets them differ in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<PayloadRecord>,
     /// Changes of many robots at once.
     pub events: Vec<EventRecord>,
     /// Logs that could not be reduced or read.
@@ -265,6 +268,44 @@ pub struct LogDeviation {
     pub p: f64,
 }
 
+/// What logs carried on a link.
+///
+/// Factors tell differences alone: what all logs carry is part of the link. Beyond a log `0` that carried nothing, log `l` carried the mass
+/// `m_l - m_0`, and its centre is `(h_l - h_0)/(m_l - m_0)` in the frame of the joint that moves the link, `h` the first moments.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct PayloadRecord {
+    /// Link.
+    pub link: String,
+    /// Parameters of the link that the efforts tell.
+    pub parameters: Vec<CarriedParameter>,
+    /// Logs, robot by robot in the order of time.
+    pub logs: Vec<CarriedByLog>,
+}
+
+/// A parameter of a link that carries something.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CarriedParameter {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Standard deviation between logs.
+    pub between_logs: f64,
+}
+
+/// What a log carried beyond the mean of all logs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CarriedByLog {
+    /// Log.
+    pub log: String,
+    /// Robot.
+    pub robot: String,
+    /// Per parameter: what it was in the log, less the mean over all logs.
+    pub difference: Vec<f64>,
+    /// Per parameter: standard deviation of what it was in the log.
+    pub sd: Vec<f64>,
+}
+
 /// A change of many robots at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct EventRecord {
@@ -325,6 +366,7 @@ impl FleetResult {
             noise: self.noise(),
             robots,
             logs_to_look_at,
+            payload: self.payload(),
             events,
             failures: self.failures.clone(),
             repeated: self.repeated,
@@ -530,6 +572,39 @@ impl FleetResult {
         out
     }
 
+    fn payload(&self) -> Option<PayloadRecord> {
+        let link = self.recipe.payload()?.to_owned();
+        let wanted = payload_columns(&link);
+        let told = |k: &usize| wanted.contains(&self.name(*k));
+        let carried: Vec<usize> = (0..self.fleet.varying.len()).filter(told).collect();
+        let parameter = |k: &usize| CarriedParameter {
+            name: self.name(*k),
+            unit: self.unit(*k),
+            between_logs: self.fit.variances.logs[*k].sqrt(),
+        };
+        let of_log = |l: usize| {
+            let values = self.fit.values_of_log(&self.fleet, l)?;
+            Some(CarriedByLog {
+                log: self.built.facts[l].log.name.clone(),
+                robot: self.built.robots[self.fleet.logs[l].robot].clone(),
+                difference: carried.iter().map(|k| values[self.fleet.varying[*k].column]).collect(),
+                sd: carried.iter().map(|k| self.fit.logs[l].value_sd[*k]).collect(),
+            })
+        };
+        let mut order: Vec<usize> = (0..self.fleet.logs.len()).collect();
+        let place = |l: &usize| (self.fleet.logs[*l].robot, self.fleet.logs[*l].time_s);
+        order.sort_by(|a, b| {
+            let ((robot, time), (other, later)) = (place(a), place(b));
+            robot.cmp(&other).then(time.total_cmp(&later))
+        });
+        let mut logs: Vec<CarriedByLog> = order.into_iter().filter_map(of_log).collect();
+        for k in 0..carried.len() {
+            let mean = logs.iter().map(|log| log.difference[k]).sum::<f64>() / logs.len() as f64;
+            logs.iter_mut().for_each(|log| log.difference[k] -= mean);
+        }
+        Some(PayloadRecord { link, parameters: carried.iter().map(parameter).collect(), logs })
+    }
+
     /// What the numbers are to be read with.
     fn doubts(&self, parameters: &[FleetParameter]) -> Vec<String> {
         let fit = &self.fit;
@@ -581,6 +656,11 @@ impl FleetResult {
                 "{} ({:.1} Hz): residuals hold {:.0} times as much of what the motion can explain as noise would: the model lacks something there",
                 channel.output, channel.kernel_hz, channel.colour
             ));
+        }
+        if told.iter().any(|c| c.colour > COLOURED) && self.recipe.payload().is_none() {
+            out.push(
+                "robots that do not always carry the same need a recipe that lets logs differ in it: `dynid reduce --payload LINK`".to_owned(),
+            );
         }
         for (r, influence) in fit.influence.iter().enumerate().filter(|(_, i)| **i > INFLUENCE) {
             out.push(format!(

@@ -5,12 +5,12 @@ use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
 
 use super::FleetResult;
-use super::record::{FleetFile, RobotRecord, RobotState};
+use super::record::{CarriedByLog, FleetFile, RobotRecord, RobotState};
 use crate::Error;
 
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;
-/// Failures that the page lists.
+/// Failures, and logs with what they carried, that the page lists.
 const LISTED: usize = 200;
 
 fn text(value: impl Into<String>) -> Value {
@@ -204,6 +204,7 @@ impl FleetResult {
                 outliers,
             ),
             table("Logs to look at", &["Log", "Robot", "Stands out in"], logs),
+            self.carried(file),
             table("Logs that failed", &["Log", "Robot", "Code", "What is wrong"], failures),
             self.map(file),
             table(
@@ -230,23 +231,54 @@ impl FleetResult {
         }
     }
 
+    /// What logs carried, heaviest first.
+    fn carried(&self, file: &FleetFile) -> StudyTable {
+        let Some(payload) = &file.payload else { return table("", &[], Vec::new()) };
+        let mut logs: Vec<&CarriedByLog> = payload.logs.iter().collect();
+        let first = |log: &CarriedByLog| log.difference.first().copied().unwrap_or(0.0);
+        logs.sort_by(|a, b| first(b).total_cmp(&first(a)));
+        let row = |log: &&CarriedByLog| {
+            let values = log.difference.iter().zip(&log.sd);
+            let values = values.map(|(value, sd)| text(format!("{} ± {}", short(*value), short(*sd))));
+            [text(log.log.clone()), text(log.robot.clone())].into_iter().chain(values).collect()
+        };
+        let head = ["Log".to_owned(), "Robot".to_owned()];
+        let shown = match logs.len() > LISTED {
+            true => format!(", the first {LISTED} of {}", logs.len()),
+            false => String::new(),
+        };
+        StudyTable {
+            caption: format!(
+                "Carried on {} beyond the mean of all logs, by the first column{shown}",
+                payload.link
+            ),
+            head: head
+                .into_iter()
+                .chain(payload.parameters.iter().map(|p| format!("{}, {}", p.name, p.unit)))
+                .collect(),
+            rows: logs.iter().take(LISTED).map(row).collect(),
+        }
+    }
+
     /// Robots against parameters: deviations from the type over the spread between robots.
     fn map(&self, file: &FleetFile) -> StudyTable {
         let mut heading = vec!["Robot".to_owned(), "State".to_owned(), "Logs".to_owned()];
-        heading.extend((0..self.fleet.varying.len()).map(|k| self.name(k)));
-        let row = |r: &RobotRecord| {
-            let mut row = vec![
-                text(r.name.clone()),
-                text(r.state.word().replace('_', " ")),
-                Value::Count(r.logs as u64),
-            ];
-            row.extend(
-                r.parameters
-                    .iter()
-                    .map(|p| p.deviation.map_or(Value::Undefined, |d| text(format!("{d:+.1}")))),
-            );
-            row
-        };
+        // What logs carry is no matter of the robot.
+        let shown: Vec<usize> =
+            (0..self.fleet.varying.len()).filter(|k| self.fleet.varying[*k].watched).collect();
+        heading.extend(shown.iter().map(|k| self.name(*k)));
+        let row =
+            |r: &RobotRecord| {
+                let mut row = vec![
+                    text(r.name.clone()),
+                    text(r.state.word().replace('_', " ")),
+                    Value::Count(r.logs as u64),
+                ];
+                row.extend(shown.iter().map(|k| {
+                    r.parameters[*k].deviation.map_or(Value::Undefined, |d| text(format!("{d:+.1}")))
+                }));
+                row
+            };
         StudyTable {
             caption: "Robots: deviation from the type, in standard deviations between robots".to_owned(),
             head: heading,

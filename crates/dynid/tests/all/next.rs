@@ -14,7 +14,7 @@ use dynid::design::DesignConfig;
 use dynid::design::next::{NextRun, NextSettings, Wanted, WantedState, next};
 use dynid::io::MappingSpec;
 use dynid::record::Outcome;
-use dynid::reduce::{self, Reduction};
+use dynid::reduce::{self, OwnOfLogs, Reduction};
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 
@@ -73,7 +73,7 @@ fn to_the_end(seed: u64, list: &[&str]) -> ([f64; 2], [usize; 2]) {
     let first = recorded(seed, None);
     write_log(&first, &at("first.csv"));
     let config = Config { robot: robots().1, log: vec![log(&at("first.csv"))], ..Config::default() };
-    let earlier = reduce::learn(&config, false, &mut |_| {}).unwrap().reduction;
+    let earlier = reduce::learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap().reduction;
     let run = asked(list, &earlier).unwrap();
     let record = run.record().unwrap();
     println!("seed {seed}: {}", record.verdict.headline);
@@ -152,7 +152,7 @@ fn rows_of_a_recorded_log_bring_what_they_promise() {
     let [early, late] =
         [(0.0, 0.35), (0.35, 0.7)].map(|part| LogConfig { part: Some(part), ..config.log[0].clone() });
     config.log = vec![early];
-    let earlier = reduce::learn(&config, false, &mut |_| {}).unwrap().reduction;
+    let earlier = reduce::learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap().reduction;
     let recipe = earlier.recipe().clone();
     let further = reduce::reduce(recipe, &[late], &config.columns, None, &mut |_| {}).unwrap();
     let known = earlier.solve([], &mut |_| {}).unwrap().knowledge();

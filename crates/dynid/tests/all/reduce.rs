@@ -14,7 +14,7 @@ use dynid::io::digest::sha256_bytes;
 use dynid::log::Log;
 use dynid::motion::Log as Recording;
 use dynid::record::ParameterVerdict;
-use dynid::reduce::{FactorFileFault, Learned, Reduction, ReductionError, learn, reduce};
+use dynid::reduce::{FactorFileFault, Learned, OwnOfLogs, Reduction, ReductionError, learn, reduce};
 use dynid::settings::Preflight;
 use dynid::settings::{LogSettings, Own};
 
@@ -38,7 +38,12 @@ pub(crate) fn learned() -> &'static Learned {
     LEARNED.get_or_init(|| {
         let [first, second, _] = parts();
         let robot = example("robot.toml");
-        learn(&Config { robot, log: vec![first, second], ..Config::default() }, false, &mut |_| {}).unwrap()
+        learn(
+            &Config { robot, log: vec![first, second], ..Config::default() },
+            &OwnOfLogs::default(),
+            &mut |_| {},
+        )
+        .unwrap()
     })
 }
 
@@ -157,7 +162,7 @@ fn what_no_recipe_knows_is_refused() {
         let mut config =
             Config { robot: robot.clone(), log: vec![first.clone(), second.clone()], ..Config::default() };
         change(&mut config);
-        learn(&config, false, &mut |_| {}).unwrap_err().to_string()
+        learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap_err().to_string()
     };
     let textbook = refused(&|c| c.conditioning.route = dynid::config::Route::Textbook);
     assert!(textbook.contains("textbook route"), "{textbook}");
@@ -227,7 +232,7 @@ fn what_a_pre_flight_found_and_a_recipe_doubts_is_not_lost_with_the_samples() {
     let [first, second, third] = parts();
     let mut config = Config { robot: example("robot.toml"), log: vec![first, second], ..Config::default() };
     config.preflight = Preflight::Warn;
-    let learned = learn(&config, false, &mut |_| {}).unwrap();
+    let learned = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap();
     let recipe = learned.reduction.recipe().clone();
     assert!(recipe.doubts.is_empty(), "{:?}", recipe.doubts);
     let check = |estimate: &Estimate, name: &str| {
@@ -271,7 +276,7 @@ fn doubts_of_a_recipe_are_doubts_of_what_is_solved_by_it() {
     config.elements.default = Some(vec!["offset".to_owned()]);
     config.elements.friction = dynid::config::Friction::Given;
     config.preflight = Preflight::Warn;
-    let learned = learn(&config, false, &mut |_| {}).unwrap();
+    let learned = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap();
     let open: Vec<_> = learned.estimate.verdict.checks.iter().filter(|c| c.status.word() != "ok").collect();
     let doubts = &learned.reduction.recipe().doubts;
     assert!(!doubts.is_empty() && doubts.iter().all(|d| open.iter().any(|c| c.name == d.name)), "{open:?}");
@@ -301,7 +306,7 @@ fn the_pre_flight_of_a_recipe_knows_the_elements_of_the_robot_file() {
     crate::support::write_log(&simulate(&truth, &settings).unwrap(), &path("log.csv"));
     let log = LogConfig { path: path("log.csv"), ..LogConfig::default() };
     let config = Config { robot: path("arm.toml"), log: vec![log.clone()], ..Config::default() };
-    let learned = learn(&config, false, &mut |_| {}).unwrap();
+    let learned = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap();
     let recipe = learned.reduction.recipe().clone();
     let reduced = reduce(recipe, &[log], &MappingSpec::default(), None, &mut |_| {}).unwrap();
     let solved = reduced.solve([], &mut |_| {}).unwrap().estimate();
@@ -313,7 +318,7 @@ fn factors_of_another_recipe_do_not_mix() {
     let [first, ..] = parts();
     let mut config = Config { robot: example("robot.toml"), log: vec![first], ..Config::default() };
     config.conditioning.kernel_hz = Some(2.0);
-    let other = learn(&config, false, &mut |_| {}).unwrap().reduction;
+    let other = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap().reduction;
     let found = Reduction::merge([learned().reduction.clone(), other]).unwrap_err();
     assert!(matches!(found, ReductionError::OtherRecipe { .. }), "{found}");
     assert_eq!(Reduction::merge([]).unwrap_err(), ReductionError::Nothing);
