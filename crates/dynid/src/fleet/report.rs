@@ -10,8 +10,10 @@ use crate::Error;
 
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;
-/// Failures, and logs with what they carried, that the page lists.
+/// Failures that the page lists.
 const LISTED: usize = 200;
+/// Logs whose payload the page lists, and parameters of each: mass and first moments where efforts tell them.
+const HEAVIEST: (usize, usize) = (20, 4);
 
 fn text(value: impl Into<String>) -> Value {
     Value::Text(value.into())
@@ -204,9 +206,9 @@ impl FleetResult {
                 outliers,
             ),
             table("Logs to look at", &["Log", "Robot", "Stands out in"], logs),
-            self.carried(file),
             table("Logs that failed", &["Log", "Robot", "Code", "What is wrong"], failures),
             self.map(file),
+            self.carried(file),
             table(
                 "Parameters that vary",
                 &["Parameter", "Type", "Unit", "sd between robots", "sd between logs"],
@@ -231,32 +233,29 @@ impl FleetResult {
         }
     }
 
-    /// What logs carried, heaviest first.
+    /// What the logs that carried most carried.
     fn carried(&self, file: &FleetFile) -> StudyTable {
         let Some(payload) = &file.payload else { return table("", &[], Vec::new()) };
+        let (most, parameters) = HEAVIEST;
         let mut logs: Vec<&CarriedByLog> = payload.logs.iter().collect();
         let first = |log: &CarriedByLog| log.difference.first().copied().unwrap_or(0.0);
         logs.sort_by(|a, b| first(b).total_cmp(&first(a)));
         let row = |log: &&CarriedByLog| {
-            let values = log.difference.iter().zip(&log.sd);
+            let values = log.difference.iter().zip(&log.sd).take(parameters);
             let values = values.map(|(value, sd)| text(format!("{} ± {}", short(*value), short(*sd))));
             [text(log.log.clone()), text(log.robot.clone())].into_iter().chain(values).collect()
         };
-        let head = ["Log".to_owned(), "Robot".to_owned()];
-        let shown = match logs.len() > LISTED {
-            true => format!(", the first {LISTED} of {}", logs.len()),
-            false => String::new(),
-        };
+        let told = payload.parameters.iter().take(parameters);
+        let head = ["Log".to_owned(), "Robot".to_owned()].into_iter();
         StudyTable {
             caption: format!(
-                "Carried on {} beyond the mean of all logs, by the first column{shown}",
-                payload.link
+                "Carried on {} beyond the mean of all logs: {} of {} that carried most, all are in fleet.json",
+                payload.link,
+                logs.len().min(most),
+                logs.len()
             ),
-            head: head
-                .into_iter()
-                .chain(payload.parameters.iter().map(|p| format!("{}, {}", p.name, p.unit)))
-                .collect(),
-            rows: logs.iter().take(LISTED).map(row).collect(),
+            head: head.chain(told.map(|p| format!("{}, {}", p.name, p.unit))).collect(),
+            rows: logs.iter().take(most).map(row).collect(),
         }
     }
 
