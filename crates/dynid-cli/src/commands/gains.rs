@@ -15,12 +15,29 @@ pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let found = identify_gains(&config, &mut |step| progress.step(step))?;
     let file = found.file();
     drop(progress);
-    Notes::new(args.print.quiet).warnings(&file.warnings);
+    let notes = Notes::new(args.print.quiet);
+    notes.warnings(&file.warnings);
     match args.print.json {
         true => json(&file)?,
         false => data(&summary(&file))?,
     }
+    if let Some(hint) = one_scale(&file) {
+        notes.tell(&hint);
+    }
     Ok(u8::from(file.status == Status::Fail))
+}
+
+/// Where gains stay open: all drives together tell one scale, since the masses are the same for all.
+fn one_scale(file: &GainsFile) -> Option<String> {
+    let open: Vec<&str> = file.joints.iter().filter(|j| j.gain.is_none()).map(|j| j.joint.as_str()).collect();
+    (!open.is_empty()).then(|| {
+        format!(
+            "no gain of {}: `dynid identify` of the same logs with `known_mass = {{ {:?} = {} }}`, and `[[payload]]` without `mass`, tells one scale of all drives",
+            open.join(", "),
+            file.payload,
+            file.mass
+        )
+    })
 }
 
 fn summary(file: &GainsFile) -> String {
