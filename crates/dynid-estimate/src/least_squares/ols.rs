@@ -90,6 +90,25 @@ pub fn ols(factor: &Factor) -> LinearSolution {
     }
 }
 
+/// Parameters of a factor, and the columns behind them, without the evidence of its rank.
+pub(crate) struct Solved {
+    /// `p` parameters; those of dropped columns are zero.
+    pub(crate) x: Vec<f64>,
+    /// Independent columns the solution uses, ascending.
+    pub(crate) kept: Vec<usize>,
+    /// Factor of the kept columns.
+    pub(crate) factor: Factor,
+}
+
+/// What [`ols`] solves for, the same bits: singular values take most of its time, and only factors need them that may be rank-deficient.
+pub(crate) fn solved(factor: Factor) -> Solved {
+    if certainly_full_rank(&factor) {
+        return Solved { x: factor.solve(), kept: (0..factor.columns()).collect(), factor };
+    }
+    let LinearSolution { x, kept, factor, .. } = ols(&factor);
+    Solved { x, kept, factor }
+}
+
 /// [`LinearSolution::x`] (`p` parameters, those of dropped columns zero) and [`LinearSolution::rss`] (effort²) of [`ols`], the same bits
 /// without the evidence of its rank.
 ///

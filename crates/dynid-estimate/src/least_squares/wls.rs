@@ -1,8 +1,9 @@
 //! Weighted least squares with one residual variance per group of rows.
 
-use super::ols::{LinearSolution, ols};
+use super::ols::{LinearSolution, Solved, ols, solved};
 use dynid_factor::factor::Factor;
 use dynid_linalg::triangular::inverse;
+use rayon::prelude::*;
 
 /// Settings of [`wls`].
 #[derive(Debug, Clone, PartialEq)]
@@ -97,8 +98,7 @@ pub(crate) fn wls_with(
     assert!(variances.iter().all(|v| v.is_finite() && *v > 0.0), "variances to start from: {variances:?}");
     let mut passes = 0;
     loop {
-        let factor = merge_weighted(groups, &variances);
-        let solution = solve(&factor, prior);
+        let solution = solved_near(merge_weighted(groups, &variances), prior);
         let found = group_variances(groups, classes, &variances, &solution, settings.floor);
         passes += 1;
         let change = found
@@ -111,7 +111,9 @@ pub(crate) fn wls_with(
             let variances: Vec<f64> = found.iter().map(|g| g.variance).collect();
             let factor = merge_weighted(groups, &variances);
             let solution = solve(&factor, prior);
-            let last = group_variances(groups, classes, &variances, &solution, settings.floor);
+            let LinearSolution { x, kept, factor: of_kept, .. } = solution.clone();
+            let last_solved = Solved { x, kept, factor: of_kept };
+            let last = group_variances(groups, classes, &variances, &last_solved, settings.floor);
             let groups = found
                 .into_iter()
                 .zip(last)
@@ -134,6 +136,14 @@ fn solve(factor: &Factor, prior: Option<&PriorRows>) -> LinearSolution {
     solution
 }
 
+/// [`solve`] without its evidence.
+fn solved_near(factor: Factor, prior: Option<&PriorRows>) -> Solved {
+    let Some(PriorRows { weights, x0 }) = prior else { return solved(factor) };
+    let mut solution = solved(factor.with_prior_rows(weights, x0).centred(x0));
+    solution.x.iter_mut().zip(x0).for_each(|(d, x0)| *d += x0);
+    solution
+}
+
 /// Merges groups weighted by `1/σ_j`, in the order given.
 pub(crate) fn merge_weighted(groups: &[Factor], variances: &[f64]) -> Factor {
     let weighted: Vec<Factor> = groups.iter().zip(variances).map(|(f, v)| f.scaled(1.0 / v.sqrt())).collect();
@@ -144,12 +154,12 @@ fn group_variances(
     groups: &[Factor],
     classes: &[usize],
     variances: &[f64],
-    solution: &LinearSolution,
+    solution: &Solved,
     floor: f64,
 ) -> Vec<GroupVariance> {
     let inverse = inverse(&solution.factor.r_matrix());
     let found: Vec<(f64, f64)> = groups
-        .iter()
+        .par_iter()
         .zip(variances)
         .map(|(group, variance)| {
             let product = group.select(&solution.kept).r_matrix() * &inverse;

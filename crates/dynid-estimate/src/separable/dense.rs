@@ -1,6 +1,8 @@
 //! Small dense matrices, and Householder triangles of them with a rank.
 
 use dynid_linalg::vector::{add_scaled, dot, norm};
+use rayon::prelude::*;
+use rayon::slice::ChunksMut;
 
 /// A dense matrix, column after column.
 #[derive(Debug, Clone)]
@@ -28,6 +30,12 @@ impl Columns {
 
     pub(super) fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.data[j * self.rows..][..self.rows]
+    }
+
+    /// Columns from one on, to be written.
+    pub(super) fn columns_from(&mut self, first: usize) -> ChunksMut<'_, f64> {
+        let rows = self.rows.max(1);
+        self.data[first * self.rows..].par_chunks_mut(rows)
     }
 
     /// Column `j`, to be read, beside column `k`, to be written.

@@ -160,15 +160,11 @@ impl<'a> Projection<'a> {
         let mut stack = self.stacked(&self.rotated(columns, target), target);
         let sizes: Vec<f64> = (0..c).map(|j| norm(stack.column(j))).collect();
         let fixed_rank = self.fixed.rank();
-        for j in 0..stack.count() {
-            self.fixed.rotate(&mut stack.column_mut(j)[..self.heads]);
-        }
+        stack.columns_from(0).for_each(|column| self.fixed.rotate(&mut column[..self.heads]));
         let mut outside = Columns::zeros(stack.rows() - fixed_rank, c);
         (0..c).for_each(|j| outside.column_mut(j).copy_from_slice(&stack.column(j)[fixed_rank..]));
         let free = PivotedQr::new(outside, &sizes, self.rows);
-        for j in c..=c + d {
-            free.rotate(&mut stack.column_mut(j)[fixed_rank..]);
-        }
+        stack.columns_from(c).for_each(|column| free.rotate(&mut column[fixed_rank..]));
         let inside = fixed_rank + free.rank();
 
         let known: Vec<f64> = match target {

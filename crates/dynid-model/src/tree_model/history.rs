@@ -1,5 +1,7 @@
 //! Signals that depend on the motion before.
 
+use rayon::prelude::*;
+
 use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::History;
@@ -33,14 +35,18 @@ impl TreeModel {
         let own = self.elements.iter().map(|placed| (placed, placed.shape(shape)));
         let known = self.known.iter().map(|k| (&k.placed, k.shape.as_slice()));
         let mut rows = out.chunks_mut(stride).map(|row| &mut row[..motion.samples]);
-        for ((placed, shape), state) in own.chain(known).zip(&mut history.states) {
+        let remembering =
+            own.chain(known).zip(&mut history.states).filter(|((placed, _), _)| placed.signals > 0);
+        let each = remembering.map(|((placed, shape), state)| {
             let PlacedElement { element, signals, .. } = placed;
-            if *signals == 0 {
-                continue;
-            }
-            let mut rows: Vec<&mut [f64]> = rows.by_ref().take(*signals).collect();
+            let rows: Vec<&mut [f64]> = rows.by_ref().take(*signals).collect();
             assert_eq!(rows.len(), *signals, "room for signals");
+            (element, shape, state, rows)
+        });
+        let each: Vec<_> = each.collect();
+        // Sample after sample, each waits for the one before: elements run beside each other.
+        each.into_par_iter().for_each(|(element, shape, state, mut rows)| {
             element.remember(&self.joints, motion, step_s, shape, state, &mut rows);
-        }
+        });
     }
 }
