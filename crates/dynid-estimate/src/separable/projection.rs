@@ -7,7 +7,7 @@ use dynid_linalg::vector::{add_scaled, dot, norm};
 use rayon::prelude::*;
 
 /// Values per group above which groups are rotated in parallel.
-const PARALLEL_VALUES: usize = 100_000;
+const PARALLEL_VALUES: usize = 10_000;
 
 /// The problem at one vector of shape parameters.
 #[derive(Debug, Clone)]
