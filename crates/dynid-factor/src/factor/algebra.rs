@@ -37,6 +37,9 @@ impl Factor {
     #[must_use]
     pub fn select(&self, columns: &[usize]) -> Factor {
         assert!(columns.iter().all(|&c| c < self.columns), "selected columns exist");
+        if columns.iter().copied().eq(0..self.columns) {
+            return self.clone();
+        }
         let mut builder = FactorBuilder::with_chunk_rows(columns.len(), self.height());
         builder
             .stack(self.height(), |i, j| self.triangle[(i, columns.get(j).copied().unwrap_or(self.columns))]);
