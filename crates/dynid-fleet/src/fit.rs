@@ -80,8 +80,6 @@ pub struct LogFit {
     pub deviation: Vec<f64>,
     /// Per coordinate: standard deviation of that.
     pub deviation_sd: Vec<f64>,
-    /// Per coordinate: standard deviation of its value in the log ([`FleetFit::values_of_log`]), which the log itself tells.
-    pub value_sd: Vec<f64>,
     /// Per coordinate: weight by Student's t.
     pub weights: Vec<f64>,
 }
@@ -323,10 +321,9 @@ pub(crate) fn finish(fleet: &Fleet, found: Found, freedom: f64) -> Result<FleetF
         let sd = |d: &crate::sweep::Deviation| (0..q).map(|k| d.variance(k).max(0.0).sqrt()).collect();
         let logs: Vec<(usize, LogFit)> = (splits.by_robot[r].iter())
             .map(|k| {
-                let (deviation, variances) = sweep.log_and_values(*k, &state);
+                let deviation = sweep.log(*k, &state);
                 let (deviation_sd, weights) = (sd(&deviation), robust.log_weights[*k].clone());
-                let value_sd = variances.into_iter().map(f64::sqrt).collect();
-                (*k, LogFit { deviation: deviation.mean, deviation_sd, value_sd, weights })
+                (*k, LogFit { deviation: deviation.mean, deviation_sd, weights })
             })
             .collect();
         let robot = RobotFit {

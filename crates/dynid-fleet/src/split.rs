@@ -3,7 +3,7 @@
 use dynid_linalg::Mat;
 use rayon::prelude::*;
 
-use crate::data::{Fleet, FleetLog};
+use crate::data::{ChannelFactor, Fleet, FleetLog};
 use crate::noise::Noise;
 use crate::tree;
 use crate::triangle::{corner, head, of_stacked};
@@ -46,8 +46,9 @@ impl Splits {
         let means = means(fleet);
         let place = places(&order);
         let split = |(k, log): (usize, &FleetLog)| {
-            let triangle =
-                of_stacked(stacked(log, &place, |at| noise.weight(k, at, log.channels[at].channel)));
+            let triangle = of_stacked(stacked(&log.channels, &place, |at| {
+                noise.weight(k, at, log.channels[at].channel)
+            }));
             let covariates = log.covariates.iter().zip(&means).map(|(u, mean)| u - mean).collect();
             (LogSplit { covariates, top: head(&triangle, q) }, corner(&triangle, q, q))
         };
@@ -109,12 +110,12 @@ pub(crate) fn places(order: &[usize]) -> Vec<usize> {
 }
 
 /// Weighted triangles of a log's channels over one another, columns in the order of the fit, `ρ` below each.
-fn stacked(log: &FleetLog, place: &[usize], weight: impl Fn(usize) -> f64) -> Mat {
+pub(crate) fn stacked(channels: &[ChannelFactor], place: &[usize], weight: impl Fn(usize) -> f64) -> Mat {
     let width = place.len() + 1;
-    let heights = log.channels.iter().map(|c| c.factor.height() + 1);
+    let heights = channels.iter().map(|c| c.factor.height() + 1);
     let mut out = Mat::zeros(heights.sum(), width);
     let mut first = 0;
-    for (at, channel) in log.channels.iter().enumerate() {
+    for (at, channel) in channels.iter().enumerate() {
         let (w, factor) = (weight(at), &channel.factor);
         let (triangle, height) = (factor.triangle(), factor.height());
         for (j, column) in channel.columns.iter().enumerate() {

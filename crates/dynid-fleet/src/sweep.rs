@@ -136,30 +136,6 @@ impl<'a> Sweep<'a> {
 
     /// The deviation of a log from its robot.
     pub(crate) fn log(&self, k: usize, robot: &RobotState) -> Deviation {
-        self.log_with_map(k, robot).0
-    }
-
-    /// The deviation of a log from its robot, and the variances of the values `f + b + Γ u + c` of its coordinates: what the log itself tells
-    /// does not hang on how well its robot is known.
-    pub(crate) fn log_and_values(&self, k: usize, robot: &RobotState) -> (Deviation, Vec<f64>) {
-        let (deviation, map) = self.log_with_map(k, robot);
-        let q = self.splits.q;
-        // E of the coordinates at the log's covariates: v = E x + c, c = -M x + ..., so that the covariance is (E - M) C (E - M)ᵀ + `given`.
-        let covariates = &self.splits.logs[k].covariates;
-        let places: Vec<(usize, f64)> = std::iter::once((0, 1.0))
-            .chain(covariates.iter().enumerate().map(|(c, u)| (q + c * q, *u)))
-            .collect();
-        let variance = |i: usize| {
-            let above = places.iter().flat_map(|(a, u)| places.iter().map(move |(b, v)| (a, b, u * v)));
-            let above: f64 = above.map(|(a, b, w)| w * robot.covariance[(a + i, b + i)]).sum();
-            let shared: f64 = places.iter().map(|(a, u)| u * map[(i, a + i)]).sum();
-            (above - 2.0 * shared + deviation.added[(i, i)] + deviation.given[(i, i)]).max(0.0)
-        };
-        let variances = (0..q).map(variance).collect();
-        (deviation, variances)
-    }
-
-    fn log_with_map(&self, k: usize, robot: &RobotState) -> (Deviation, Mat) {
         let rows = self.splits.with_slopes(&self.logs[k], &self.splits.logs[k].covariates);
         deviation(
             rows.view(),
@@ -168,6 +144,35 @@ impl<'a> Sweep<'a> {
             &robot.values,
             &robot.covariance,
         )
+        .0
+    }
+
+    /// How errors of the parameters of its robot are in the values `f + b + Γ u + c` of a log's coordinates (`q × p`), and the covariance of these
+    /// values where the robot's are known.
+    pub(crate) fn errors_of_log(&self, k: usize) -> (Mat, Mat) {
+        let q = self.splits.q;
+        let covariates = &self.splits.logs[k].covariates;
+        let rows = self.splits.with_slopes(&self.logs[k], covariates);
+        let Response { map, given, .. } =
+            Response::of(rows.view(), (q, 0), self.theta.len(), &self.variances.of_log(k));
+        let own = |i: usize, j: usize| match j {
+            _ if j < q => f64::from(j == i),
+            _ if j < q + q * covariates.len() => f64::from((j - q) % q == i) * covariates[(j - q) / q],
+            _ => 0.0,
+        };
+        (Mat::from_fn(q, self.theta.len(), |i, j| own(i, j) - map[(i, j)]), given)
+    }
+
+    /// How errors of the parameters of the type are in the deviation of a robot, with the other sign (`q × p`), and the covariance of the deviation
+    /// where the type is known.
+    pub(crate) fn errors_of_robot(&self, r: usize) -> (Mat, Mat) {
+        let Response { map, given, .. } = Response::of(
+            self.robots[r].view(),
+            (self.splits.q, 0),
+            self.theta.len(),
+            &self.variances.of_robot(r),
+        );
+        (map, given)
     }
 
     /// Largest information on every coordinate that one robot has, and one log.
@@ -215,6 +220,30 @@ fn robot(splits: &Splits, variances: &Variances, logs: &[Mat], r: usize) -> (Mat
     (top, factor, logdet)
 }
 
+/// How a deviation follows from rows `[f | ... | z]` that were whitened with its variances `D` in them.
+struct Response {
+    /// `K = D R_ffᵀ S⁻¹` of the rows before they were whitened.
+    gain: Mat,
+    /// `M`, by which the deviation follows errors of the parameters above it with the other sign.
+    map: Mat,
+    /// `D - M_f D`: covariance of the deviation where these are known.
+    given: Mat,
+}
+
+impl Response {
+    /// `first`: column of the first of `p` parameters, with the effort behind them; columns of the deviation are the first `q`.
+    fn of(rows: View<'_>, (q, first): (usize, usize), p: usize, variances: &[f64]) -> Response {
+        let gain = Mat::from_fn(q, rows.nrows(), |i, j| variances[i] * rows[(j, i)]);
+        let map = gain.view() * rows.columns(first..first + p);
+        let own = if first == 0 { map.columns(0..q).to_mat() } else { gain.view() * rows.columns(0..q) };
+        let given = Mat::from_fn(q, q, |i, j| {
+            let prior = if i == j { variances[i] } else { 0.0 };
+            prior - 0.5 * (own[(i, j)] * variances[j] + own[(j, i)] * variances[i])
+        });
+        Response { gain, map, given }
+    }
+}
+
 /// Posterior of a deviation with variances `D` from whitened rows `[f | ... | z]`, and `M C`.
 ///
 /// `first`: column of the first of the parameters `x`, with the effort behind them; columns of the deviation are the first `q`.
@@ -226,21 +255,13 @@ pub(crate) fn deviation(
     covariance: &Mat,
 ) -> (Deviation, Mat) {
     let p = x.len();
-    let columns = rows.columns(first..first + p);
-    let fitted = times(&columns, x);
+    let fitted = times(&rows.columns(first..first + p), x);
     let residual: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, first + p)] - fitted[i]).collect();
-    // K = D R_ffᵀ S⁻¹ of the rows before they were whitened.
-    let gain = Mat::from_fn(q, rows.nrows(), |i, j| variances[i] * rows[(j, i)]);
+    let Response { gain, map, given } = Response::of(rows, (q, first), p, variances);
     let mean = gain.times(&residual);
-    let m = gain.view() * columns;
-    let map = m.view() * covariance;
-    let added = map.view() * m.transpose();
-    let own = if first == 0 { m.columns(0..q).to_mat() } else { gain.view() * rows.columns(0..q) };
-    let given = Mat::from_fn(q, q, |i, j| {
-        let prior = if i == j { variances[i] } else { 0.0 };
-        prior - 0.5 * (own[(i, j)] * variances[j] + own[(j, i)] * variances[i])
-    });
-    (Deviation { mean, given, added }, map)
+    let followed = map.view() * covariance;
+    let added = followed.view() * map.transpose();
+    (Deviation { mean, given, added }, followed)
 }
 
 /// Every column of the type has a pivot worth the name.

@@ -328,8 +328,8 @@ fn what_logs_carry_is_told_and_hides_no_change() {
         held += usize::from(off.abs() < 1.96 * sd);
         squares += off * off / 120.0;
     }
-    // Slow logs of six seconds smear the sign of the shoulder's friction beyond what their noise says.
-    assert!(held >= 96 && squares < 0.02 * 0.02, "{held} of 120 intervals hold, {} kg", squares.sqrt());
+    // Slow logs of six seconds smear the sign of the shoulder's friction beyond what their halves say.
+    assert!(held >= 102 && squares < 0.02 * 0.02, "{held} of 120 intervals hold, {} kg", squares.sqrt());
     let of_type = read(&at.join("with-fleet/type.json"));
     let cautions = of_type["verdict"]["cautions"].as_array().unwrap();
     assert!(cautions.iter().any(|c| c["name"] == "payload of logs"), "{cautions:?}");

@@ -60,10 +60,12 @@ fn intervals_hold() {
                 robots.add(robot.values[*c] - truth[*c], 1.96 * robot.covariance[(*c, *c)].sqrt());
             }
         }
-        for (l, truth) in made.logs.iter().enumerate() {
-            let values = found.values_of_log(&made.fleet, l).expect("a log of a robot");
-            for (k, c) in made.arm.varying.iter().enumerate() {
-                logs.add(values[*c] - truth[*c], 1.96 * found.logs[l].value_sd[k]);
+        let all: Vec<usize> = (0..made.fleet.varying.len()).collect();
+        let differences = found.differences(&made.fleet, &all).expect("fitted");
+        for (k, c) in made.arm.varying.iter().enumerate() {
+            let mean = made.logs.iter().map(|x| x[*c]).sum::<f64>() / made.logs.len() as f64;
+            for (difference, truth) in differences.iter().zip(&made.logs) {
+                logs.add(difference.value[k] - (truth[*c] - mean), 1.96 * difference.sd[k]);
             }
         }
         let by_robots = found.jackknife.as_ref().expect("robots");

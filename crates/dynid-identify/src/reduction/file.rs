@@ -101,10 +101,13 @@ impl ReducedLog {
         }
     }
 
-    /// Returns the log with one time block, which is enough where logs stand beside many others; its key stays.
+    /// Returns the log with so many time blocks at most, of which one is enough where logs stand beside many others; its key stays.
+    ///
+    /// # Panics
+    /// If `most` is 0.
     #[must_use]
-    pub fn in_one_block(self) -> ReducedLog {
-        let groups = self.groups.iter().map(|g| g.coarsened(g.blocks.len().max(1))).collect();
+    pub fn in_blocks(self, most: usize) -> ReducedLog {
+        let groups = self.groups.iter().map(|g| g.coarsened(g.blocks.len().div_ceil(most).max(1))).collect();
         ReducedLog { groups, ..self }
     }
 }

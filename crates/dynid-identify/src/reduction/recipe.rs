@@ -5,6 +5,7 @@ use std::path::Path;
 
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
+use dynid_factor::groups::ReducedGroup;
 use dynid_model::inertia::PARAMETER_NAMES;
 use dynid_model::{EffortModel, Owner, Parameter, RobotModel};
 use dynid_motion::cutoff::KernelLimit;
@@ -168,7 +169,7 @@ pub struct Choices {
 }
 
 /// Time blocks behind standard deviations.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Blocks {
     /// Most time blocks of a log.
     pub most: usize,
@@ -379,6 +380,16 @@ impl Recipe {
                 Err(Error::setting("preferred", &format!("`{}`", wanted.join("`, `")), "not all of them"))
             }
         }
+    }
+
+    /// The blocks of a group as its factors have them. Of logs that may differ in what they carry there are two at least: no residual shows how far
+    /// what a log tells of that scatters, halves of logs do.
+    pub(super) fn coarsened(&self, group: &ReducedGroup) -> ReducedGroup {
+        let merged = match self.payload {
+            Some(_) => self.blocks.merged.min((group.blocks.len() / 2).max(1)),
+            None => self.blocks.merged,
+        };
+        group.coarsened(merged)
     }
 
     /// The link on which every log may carry something else.

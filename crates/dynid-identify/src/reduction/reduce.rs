@@ -122,7 +122,7 @@ impl Reducer {
         let logs = std::slice::from_ref(&prepared);
         let rows = LogRows::new(model, &structure.shape, &structure.base.kept, logs, &choices, &conditioned)?;
         let rows = if self.recipe.has_delays() { rows.with_delay_columns()? } else { rows };
-        let (groups, efforts) = reduced(&rows, self.recipe.outputs.len(), self.recipe.blocks.merged)?;
+        let (groups, efforts) = reduced(&rows, &self.recipe)?;
         drop(rows);
         let rest = Rest { groups, efforts, trained: TrainedLog::of(&prepared) };
         self.finish(name, log, findings, &prepared, rest)
@@ -242,21 +242,17 @@ fn check_settings(settings: &LogSettings) -> Result<(), Error> {
 }
 
 /// Factors of a log's rows in blocks of the recipe's length, and what its efforts are like.
-fn reduced(
-    rows: &LogRows<'_>,
-    outputs: usize,
-    merged: usize,
-) -> Result<(Vec<ReducedGroup>, Vec<RowSums>), Error> {
+fn reduced(rows: &LogRows<'_>, recipe: &Recipe) -> Result<(Vec<ReducedGroup>, Vec<RowSums>), Error> {
     let shapes = rows.groups();
     let mut visitors: Vec<Tallied> = shapes.iter().map(|s| Tallied::new(s.columns.len())).collect();
     visit_all(rows, &mut visitors).map_err(|e| conditioning_fault(rows, e))?;
-    let mut sums = vec![RowSums::NONE; outputs];
+    let mut sums = vec![RowSums::NONE; recipe.outputs.len()];
     let mut groups = Vec::new();
     for (visitor, shape) in visitors.into_iter().zip(shapes) {
         if shape.scale == 0 {
             sums[shape.output] = visitor.sums;
         }
-        groups.push(visitor.reducer.finish(shape).coarsened(merged));
+        groups.push(recipe.coarsened(&visitor.reducer.finish(shape)));
     }
     Ok((groups, sums))
 }

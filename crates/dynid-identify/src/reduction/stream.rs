@@ -11,6 +11,7 @@ use dynid_rows::conditioning::{
     Conditioning, ConditioningSettings, LogRows, PreparedLog, Recall, RecordFigures, least_block_samples,
 };
 
+use super::Recipe;
 use super::reduce::{Examined, Rest};
 use super::windows::{Layout, Stretch, Windows};
 use super::{LogFacts, ReducedFinding, ReducedLog, Reducer, RowSums};
@@ -237,10 +238,7 @@ struct Pass<'a> {
     /// What elements remember before a sample of the log.
     recall: Recall,
     most_blocks: usize,
-    merged: usize,
-    /// Whether rows have columns for the rest of delays.
-    delays: bool,
-    outputs: usize,
+    recipe: &'a Recipe,
     blocks: Vec<(GroupShape, Blocks)>,
     trained: TrainedLog,
     channels: Vec<Thinned>,
@@ -267,9 +265,7 @@ impl<'a> Pass<'a> {
             reach,
             recall: Recall::default(),
             most_blocks: reducer.recipe.blocks.most.max(1),
-            merged: reducer.recipe.blocks.merged,
-            delays: reducer.recipe.has_delays(),
-            outputs: reducer.recipe.outputs.len(),
+            recipe: &reducer.recipe,
             blocks: Vec::new(),
             trained: TrainedLog::of_moves(part),
             channels: Vec::new(),
@@ -284,7 +280,7 @@ impl<'a> Pass<'a> {
         let logs = std::slice::from_ref(&prepared);
         let (shape, kept) = (&structure.shape, &structure.base.kept);
         let rows = LogRows::new(model, shape, kept, logs, self.choices, &self.settings)?;
-        let rows = if self.delays { rows.with_delay_columns()? } else { rows };
+        let rows = if self.recipe.has_delays() { rows.with_delay_columns()? } else { rows };
         // From where the rows of this window begin: states there are free of the ends of this window and of the one before.
         let Recall { sample, history } = std::mem::take(&mut self.recall);
         let rows = rows.recalling(vec![Recall { sample: sample.saturating_sub(from), history }]);
@@ -321,13 +317,13 @@ impl<'a> Pass<'a> {
 
     /// What is left of a log of so many samples, and its channels at some samples.
     fn finish(self, samples: usize) -> (Rest, Vec<Channel>) {
-        let mut efforts = vec![RowSums::NONE; self.outputs];
+        let mut efforts = vec![RowSums::NONE; self.recipe.outputs.len()];
         let mut groups = Vec::with_capacity(self.blocks.len());
         for (shape, blocks) in self.blocks {
             if shape.scale == 0 {
                 efforts[shape.output] = blocks.sums;
             }
-            groups.push(blocks.finish(shape, samples).coarsened(self.merged));
+            groups.push(self.recipe.coarsened(&blocks.finish(shape, samples)));
         }
         let mut trained = self.trained;
         for (velocities, moves) in trained.velocities.iter_mut().zip(&trained.moves) {

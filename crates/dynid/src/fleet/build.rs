@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use dynid_factor::Factor;
 use dynid_files::digest::sha256_bytes;
-use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetError, FleetLog};
+use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetError, FleetLog, LogHalves};
 use dynid_identify::reduction::{LogFacts, Origin, ReducedLog, payload_columns};
 use dynid_linalg::{AsView, Mat};
 use dynid_model::Owner;
@@ -13,6 +13,8 @@ use super::{FleetFault, FleetSettings};
 use crate::Error;
 use crate::reduce::{Column, Recipe};
 
+/// Logs that are looked at in halves, at most.
+const HALVED: usize = 100;
 /// Symbol of the inertia of a rotor, which robots of a type share.
 const ROTOR: &str = "Ia";
 /// Logs of a robot whose triangles differ by less than this share have the same motion.
@@ -35,6 +37,8 @@ pub(super) struct Built {
     pub(super) covariates: Vec<String>,
     /// Per coordinate: whether it is never negative.
     pub(super) positive: Vec<bool>,
+    /// Logs in halves, where the recipe lets logs differ in what they carry: enough of them to tell how far their values scatter.
+    pub(super) halves: Vec<LogHalves>,
     /// What the user should know.
     pub(super) warnings: Vec<String>,
 }
@@ -73,6 +77,9 @@ pub(super) fn fleet(
         }
     };
     let of_fleet: Vec<FleetLog> = logs.iter().zip(&origins).map(of_log).collect();
+    let every = logs.len().div_ceil(HALVED).max(1);
+    let halved = (0..logs.len()).step_by(every).filter(|_| recipe.payload().is_some());
+    let halves = halved.filter_map(|log| halves(log, &logs[log], scales)).collect();
     let facts: Vec<LogFacts> = logs.into_iter().map(|log| log.facts).collect();
     let key = |name: &String| u64::from_be_bytes(std::array::from_fn(|i| sha256_bytes(name.as_bytes())[i]));
     let fleet = Fleet {
@@ -102,7 +109,26 @@ pub(super) fn fleet(
         );
     }
     let starts = origins.iter().map(|o| o.start_s).collect();
-    Ok((fleet, Built { columns, robots, facts, starts, undated, covariates, positive, warnings }))
+    let built = Built { columns, robots, facts, starts, undated, covariates, positive, halves, warnings };
+    Ok((fleet, built))
+}
+
+/// A log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
+fn halves(log: usize, reduced: &ReducedLog, scales: usize) -> Option<LogHalves> {
+    let half = |second: bool| -> Option<Vec<ChannelFactor>> {
+        let channel = |g: &dynid_factor::groups::ReducedGroup| {
+            let (first, rest) = g.blocks.split_at(g.blocks.len() / 2);
+            let own: Vec<&Factor> = if second { rest } else { first }.iter().collect();
+            let rows: usize = own.iter().map(|f| f.rows()).sum();
+            (rows > 0).then(|| ChannelFactor {
+                channel: g.output * scales + g.scale,
+                columns: g.columns.clone(),
+                factor: Factor::merge(&own),
+            })
+        };
+        reduced.groups.iter().filter(|g| g.rows() > 0).map(channel).collect()
+    };
+    Some(LogHalves { log, halves: [half(false)?, half(true)?] })
 }
 
 /// Covariates that are taken.

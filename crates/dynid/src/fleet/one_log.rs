@@ -173,7 +173,8 @@ impl LogReducer {
         // One log of a million must not end the work on all others, whatever is wrong with it. Nothing is changed by what is left half done.
         let failure = match catch_unwind(AssertUnwindSafe(reduce)) {
             Ok(Ok(log)) => {
-                let mut log = log.in_one_block();
+                // Halves tell how far what logs carry scatters.
+                let mut log = log.in_blocks(if self.reducer.recipe().payload().is_some() { 2 } else { 1 });
                 log.facts.origin = Some(origin.clone());
                 log.facts.id = Some(id);
                 return Made::Factors(Box::new(log));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
-use dynid_fleet::{FEW, Noise};
+use dynid_fleet::{FEW, LogDifference, Noise};
 use dynid_identify::reduction::{DELAY, payload_columns};
 use dynid_record::{Basis, Outcome, words};
 use serde::{Deserialize, Serialize};
@@ -302,7 +302,7 @@ pub struct CarriedByLog {
     pub robot: String,
     /// Per parameter: what it was in the log, less the mean over all logs.
     pub difference: Vec<f64>,
-    /// Per parameter: standard deviation of what it was in the log.
+    /// Per parameter: standard deviation of that, as halves of logs tell it.
     pub sd: Vec<f64>,
 }
 
@@ -582,14 +582,18 @@ impl FleetResult {
             unit: self.unit(*k),
             between_logs: self.fit.variances.logs[*k].sqrt(),
         };
+        let differences = self.fit.differences(&self.fleet, &carried).ok()?;
+        let excess = self.fit.excess(&self.fleet, &carried, &self.built.halves).ok()?;
         let of_log = |l: usize| {
-            let values = self.fit.values_of_log(&self.fleet, l)?;
-            Some(CarriedByLog {
-                log: self.built.facts[l].log.name.clone(),
+            let LogDifference { value, sd } = differences[l].clone();
+            let sd = sd.iter().zip(&excess).map(|(sd, excess)| sd * excess.sqrt()).collect();
+            let log = self.built.facts[l].log.name.clone();
+            CarriedByLog {
+                log,
                 robot: self.built.robots[self.fleet.logs[l].robot].clone(),
-                difference: carried.iter().map(|k| values[self.fleet.varying[*k].column]).collect(),
-                sd: carried.iter().map(|k| self.fit.logs[l].value_sd[*k]).collect(),
-            })
+                difference: value,
+                sd,
+            }
         };
         let mut order: Vec<usize> = (0..self.fleet.logs.len()).collect();
         let place = |l: &usize| (self.fleet.logs[*l].robot, self.fleet.logs[*l].time_s);
@@ -597,11 +601,7 @@ impl FleetResult {
             let ((robot, time), (other, later)) = (place(a), place(b));
             robot.cmp(&other).then(time.total_cmp(&later))
         });
-        let mut logs: Vec<CarriedByLog> = order.into_iter().filter_map(of_log).collect();
-        for k in 0..carried.len() {
-            let mean = logs.iter().map(|log| log.difference[k]).sum::<f64>() / logs.len() as f64;
-            logs.iter_mut().for_each(|log| log.difference[k] -= mean);
-        }
+        let logs = order.into_iter().map(of_log).collect();
         Some(PayloadRecord { link, parameters: carried.iter().map(parameter).collect(), logs })
     }
 
