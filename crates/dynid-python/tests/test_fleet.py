@@ -137,6 +137,25 @@ def test_a_fleet_is_that_of_the_program(prepared: Prepared) -> None:
         dynid.fleet(prepared.folder / "factors", covariates="temperature")
 
 
+def test_what_logs_carried(prepared: Prepared, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(dynid.examples.TWO_LINKS)
+    (tmp_path / "fleet.toml").write_text("duration_s = 4\nrate_hz = 100\n[fleet]\nrobots = 4\nlogs = 6\npayload = 2\n")
+    program(tmp_path, "simulate", "arm.toml", "--config", "fleet.toml", "--seed", "2", "--out", "made")
+    truth = {log["file"].split(".")[0]: log.get("payload", 0.0) for log in json.loads((tmp_path / "made/truth.json").read_text())["logs"]}
+    bare = [("--log", f"made/logs/{log}.csv.gz") for log, mass in truth.items() if log.startswith("r001") and not mass]
+    program(tmp_path, "reduce", "arm.toml", *bare[0], "--payload", "fore", "--out", "type.factors")
+    store = dynid.FactorStore(tmp_path / "factors", tmp_path / "type.factors")
+    assert not store.reduce(tmp_path / "made/manifest.csv")["failures"]
+    found = dynid.fleet(store).payload
+    masses = [row for row in found.rows() if row["parameter"] == "fore.m"]
+    mean = sum(truth.values()) / len(truth)
+    assert len(masses) == len(truth) == 24
+    for row in masses:
+        carried = truth[Path(row["log"]).name.split(".")[0]] - mean
+        assert abs(row["difference"] - carried) < 0.1 and 0 < row["sd"] < 0.1, (row, carried)
+    assert not dynid.fleet(prepared.folder / "factors").payload.rows()
+
+
 def test_a_log_from_arrays_or_a_file_counts_once(prepared: Prepared, tmp_path: Path) -> None:
     row = prepared.rows[0]
     columns = dynid.read_columns(row["path"])

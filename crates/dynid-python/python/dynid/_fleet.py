@@ -232,6 +232,19 @@ class Fleet:
         return Table.of_rows(rows, ("log", "robot", "parameter", "deviation", "p"))
 
     @property
+    def payload(self) -> Table:
+        """What every log carried, beyond the mean of all, a row per log and parameter of the link that carries it (its mass first, `link6.m`, then first moments):
+        `difference` and its standard deviation. Without rows where the recipe was not learned for that (`payload=`, `--payload`)."""
+        carried = self.record.get("payload") or {"parameters": [], "logs": []}
+        names = [parameter["name"] for parameter in carried["parameters"]]
+        rows = [
+            {"log": log["log"], "robot": log["robot"], "parameter": name, "difference": difference, "sd": sd}
+            for log in carried["logs"]
+            for name, difference, sd in zip(names, log["difference"], log["sd"], strict=True)
+        ]
+        return Table.of_rows(rows, ("log", "robot", "parameter", "difference", "sd"))
+
+    @property
     def failures(self) -> Table:
         """Logs that could not be reduced or read, and why."""
         return _failures(self.record["failures"])
