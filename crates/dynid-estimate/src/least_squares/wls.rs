@@ -98,8 +98,8 @@ pub(crate) fn wls_with(
     assert!(variances.iter().all(|v| v.is_finite() && *v > 0.0), "variances to start from: {variances:?}");
     let mut passes = 0;
     loop {
-        let solution = solved_near(merge_weighted(groups, &variances), prior);
-        let found = group_variances(groups, classes, &variances, &solution, settings.floor);
+        let Solved { x, kept, factor } = solved_near(merge_weighted(groups, &variances), prior);
+        let found = group_variances(groups, classes, &variances, (&x, &kept, &factor), settings.floor);
         passes += 1;
         let change = found
             .iter()
@@ -111,9 +111,8 @@ pub(crate) fn wls_with(
             let variances: Vec<f64> = found.iter().map(|g| g.variance).collect();
             let factor = merge_weighted(groups, &variances);
             let solution = solve(&factor, prior);
-            let LinearSolution { x, kept, factor: of_kept, .. } = solution.clone();
-            let last_solved = Solved { x, kept, factor: of_kept };
-            let last = group_variances(groups, classes, &variances, &last_solved, settings.floor);
+            let of_kept = (&solution.x[..], &solution.kept[..], &solution.factor);
+            let last = group_variances(groups, classes, &variances, of_kept, settings.floor);
             let groups = found
                 .into_iter()
                 .zip(last)
@@ -150,20 +149,21 @@ pub(crate) fn merge_weighted(groups: &[Factor], variances: &[f64]) -> Factor {
     Factor::merge(&weighted.iter().collect::<Vec<_>>())
 }
 
+/// `(x, kept, factor)`: a solution, the columns behind it, and their factor.
 fn group_variances(
     groups: &[Factor],
     classes: &[usize],
     variances: &[f64],
-    solution: &Solved,
+    (x, kept, factor): (&[f64], &[usize], &Factor),
     floor: f64,
 ) -> Vec<GroupVariance> {
-    let inverse = inverse(&solution.factor.r_matrix());
+    let inverse = inverse(&factor.r_matrix());
     let found: Vec<(f64, f64)> = groups
         .par_iter()
         .zip(variances)
         .map(|(group, variance)| {
-            let product = group.select(&solution.kept).r_matrix() * &inverse;
-            (product.norm_l2().powi(2) / variance, group.rss(&solution.x))
+            let product = group.select(kept).r_matrix() * &inverse;
+            (product.norm_l2().powi(2) / variance, group.rss(x))
         })
         .collect();
     let least = floors(groups, classes, floor);

@@ -2,7 +2,9 @@
 
 use dynid_linalg::vector::{add_scaled, dot, norm};
 use rayon::prelude::*;
-use rayon::slice::ChunksMut;
+
+/// Values that are worth a thread.
+pub(super) const PARALLEL_VALUES: usize = 10_000;
 
 /// A dense matrix, column after column.
 #[derive(Debug, Clone)]
@@ -32,10 +34,10 @@ impl Columns {
         &mut self.data[j * self.rows..][..self.rows]
     }
 
-    /// Columns from one on, to be written.
-    pub(super) fn columns_from(&mut self, first: usize) -> ChunksMut<'_, f64> {
+    /// Columns from one on, to be written; few enough values stay with the caller's thread.
+    pub(super) fn columns_from(&mut self, first: usize) -> impl IndexedParallelIterator<Item = &mut [f64]> {
         let rows = self.rows.max(1);
-        self.data[first * self.rows..].par_chunks_mut(rows)
+        self.data[first * self.rows..].par_chunks_mut(rows).with_min_len((PARALLEL_VALUES / rows).max(1))
     }
 
     /// Column `j`, to be read, beside column `k`, to be written.

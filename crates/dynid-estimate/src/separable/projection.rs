@@ -1,13 +1,10 @@
 //! The projected residual `r(α) = (1 - QQᵀ) y` and its Kaufman Jacobian.
 
-use super::dense::{Columns, PivotedQr};
+use super::dense::{Columns, PARALLEL_VALUES, PivotedQr};
 use super::problem::{SeparableProblem, ShapedColumns};
 use super::reduction::{GroupReduction, Rotated, Target};
 use dynid_linalg::vector::{add_scaled, dot, norm};
 use rayon::prelude::*;
-
-/// Values per group above which groups are rotated in parallel.
-const PARALLEL_VALUES: usize = 10_000;
 
 /// The problem at one vector of shape parameters.
 #[derive(Debug, Clone)]
