@@ -37,17 +37,15 @@ pub struct OwnOfLogs {
 /// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it.
 ///
 /// # Errors
-/// As [`crate::identify()`], [`Identification::recipe`] and [`Reducer::reduce`].
+/// As [`crate::identify()`], [`Identification::recipe`], [`Recipe::with_payload`] and [`Reducer::reduce`].
 pub fn learn(config: &Config, own: &OwnOfLogs, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
     let mut config = config.clone();
     if let Some(link) = &own.payload {
         check_payload_link(&config.read_robot()?, link)?;
         // The columns of the link come first, so that they are kept.
-        let mut preferred = payload_columns(link);
-        preferred.extend(
-            config.preferred.iter().filter(|name| !preferred.contains(name)).cloned().collect::<Vec<_>>(),
-        );
-        config.preferred = preferred;
+        let of_link = payload_columns(link);
+        config.preferred.retain(|name| !of_link.contains(name));
+        config.preferred.splice(0..0, of_link);
     }
     let config = &config;
     let run = identify(config, progress)?;

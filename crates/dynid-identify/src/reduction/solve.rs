@@ -94,9 +94,7 @@ impl Reduction {
         out.judge(&left)?;
         Ok(out)
     }
-}
 
-impl Reduction {
     /// Logs that may carry different bodies are solved as if they carried one.
     fn carried(&self) -> Option<Caution> {
         let link = self.recipe.payload().filter(|_| self.logs.len() > 1)?;
