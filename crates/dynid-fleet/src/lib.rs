@@ -8,7 +8,7 @@
 //! | logs as factors, robots, what varies | [`Fleet`] |
 //! | parameters of type, robots and logs, with spreads | [`fit()`], [`FleetFit`] |
 //! | what is known of a robot before its first log | [`FleetFit::new_robot`] |
-//! | by how much logs differ in what they are free to differ in | [`FleetFit::differences`], [`FleetFit::excess`] |
+//! | by how much logs differ in what they are free to differ in | [`FleetFit::differences`] |
 //! | what each robot says of the type, for any estimator | [`FleetFit::said_by_robots`] |
 //! | robots and logs out of the spread | [`FleetFit::robot_outliers`], [`FleetFit::log_outliers`] |
 //! | changes with dates | [`drift()`](drift::drift) |
@@ -35,7 +35,7 @@ mod triangle;
 mod variances;
 
 pub use data::{ChannelFactor, Coordinate, FEW, Fleet, FleetError, FleetLog};
-pub use differences::{LogDifference, LogHalves};
+pub use differences::{LEAST_HALVED, LogDifference, LogHalves};
 pub use fit::{Expected, FitSettings, FleetFit, LogFit, RobotFit, fit, fit_at, variances_at};
 pub use noise::Noise;
 pub use outliers::Outlier;

@@ -61,7 +61,7 @@ fn intervals_hold() {
             }
         }
         let all: Vec<usize> = (0..made.fleet.varying.len()).collect();
-        let differences = found.differences(&made.fleet, &all).expect("fitted");
+        let differences = found.differences(&made.fleet, &all, &[]).expect("fitted");
         for (k, c) in made.arm.varying.iter().enumerate() {
             let mean = made.logs.iter().map(|x| x[*c]).sum::<f64>() / made.logs.len() as f64;
             for (difference, truth) in differences.iter().zip(&made.logs) {

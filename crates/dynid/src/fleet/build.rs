@@ -113,6 +113,11 @@ pub(super) fn fleet(
     Ok((fleet, built))
 }
 
+/// Coordinates that hold what logs carry.
+pub(super) fn carried(fleet: &Fleet) -> Vec<usize> {
+    (0..fleet.varying.len()).filter(|k| !fleet.varying[*k].watched).collect()
+}
+
 /// A log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
 fn halves(log: usize, reduced: &ReducedLog, scales: usize) -> Option<LogHalves> {
     let half = |second: bool| -> Option<Vec<ChannelFactor>> {

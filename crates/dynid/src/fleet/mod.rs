@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use dynid_fleet::drift::{Change, Drift, DriftSettings, History, drift};
-use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, RobotFit, fit};
+use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, LogDifference, Outlier, RobotFit, fit};
 
 pub use dynid_identify::reduction::Origin;
 
@@ -186,6 +186,9 @@ pub struct FleetResult {
     now: Vec<Option<RobotFit>>,
     /// The fit without efforts that are not explained, by which are: as models ask for it.
     without: Mutex<BTreeMap<Vec<bool>, Arc<FleetFit>>>,
+    /// Coordinates in which logs differ by what they carry, and by how much every log does.
+    carried: Vec<usize>,
+    differences: Vec<LogDifference>,
     robot_outliers: Vec<Outlier>,
     log_outliers: Vec<Outlier>,
     built: Built,
@@ -230,7 +233,14 @@ pub fn fleet(
     for ((r, _), fit) in changed.iter().zip(found.robots_now(&fleet, &changed).map_err(told)?) {
         now[*r] = fit;
     }
+    let carried = build::carried(&fleet);
+    let differences = match &carried[..] {
+        [] => Vec::new(),
+        carried => found.differences(&fleet, carried, &built.halves).map_err(told)?,
+    };
     Ok(FleetResult {
+        carried,
+        differences,
         now,
         without: Mutex::default(),
         robot_outliers: found.robot_outliers(settings.false_discoveries),

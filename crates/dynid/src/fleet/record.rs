@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
-use dynid_fleet::{FEW, LogDifference, Noise};
-use dynid_identify::reduction::{DELAY, payload_columns};
+use dynid_fleet::{FEW, LEAST_HALVED, LogDifference, Noise};
+use dynid_identify::reduction::DELAY;
 use dynid_record::{Basis, Outcome, words};
 use serde::{Deserialize, Serialize};
 
@@ -302,7 +302,7 @@ pub struct CarriedByLog {
     pub robot: String,
     /// Per parameter: what it was in the log, less the mean over all logs.
     pub difference: Vec<f64>,
-    /// Per parameter: standard deviation of that, as halves of logs tell it.
+    /// Per parameter: standard deviation of that, as halves of logs tell it; of fewer than twenty such logs that of noise alone, and a warning says so.
     pub sd: Vec<f64>,
 }
 
@@ -574,35 +574,27 @@ impl FleetResult {
 
     fn payload(&self) -> Option<PayloadRecord> {
         let link = self.recipe.payload()?.to_owned();
-        let wanted = payload_columns(&link);
-        let told = |k: &usize| wanted.contains(&self.name(*k));
-        let carried: Vec<usize> = (0..self.fleet.varying.len()).filter(told).collect();
         let parameter = |k: &usize| CarriedParameter {
             name: self.name(*k),
             unit: self.unit(*k),
             between_logs: self.fit.variances.logs[*k].sqrt(),
         };
-        let differences = self.fit.differences(&self.fleet, &carried).ok()?;
-        let excess = self.fit.excess(&self.fleet, &carried, &self.built.halves).ok()?;
-        let of_log = |l: usize| {
-            let LogDifference { value, sd } = differences[l].clone();
-            let sd = sd.iter().zip(&excess).map(|(sd, excess)| sd * excess.sqrt()).collect();
-            let log = self.built.facts[l].log.name.clone();
-            CarriedByLog {
-                log,
-                robot: self.built.robots[self.fleet.logs[l].robot].clone(),
-                difference: value,
-                sd,
-            }
-        };
-        let mut order: Vec<usize> = (0..self.fleet.logs.len()).collect();
+        let mut order: Vec<usize> = (0..self.differences.len()).collect();
         let place = |l: &usize| (self.fleet.logs[*l].robot, self.fleet.logs[*l].time_s);
         order.sort_by(|a, b| {
             let ((robot, time), (other, later)) = (place(a), place(b));
             robot.cmp(&other).then(time.total_cmp(&later))
         });
-        let logs = order.into_iter().map(of_log).collect();
-        Some(PayloadRecord { link, parameters: carried.iter().map(parameter).collect(), logs })
+        let of_log = |l: usize| {
+            let LogDifference { value, sd } = self.differences[l].clone();
+            let robot = self.built.robots[self.fleet.logs[l].robot].clone();
+            CarriedByLog { log: self.built.facts[l].log.name.clone(), robot, difference: value, sd }
+        };
+        Some(PayloadRecord {
+            link,
+            parameters: self.carried.iter().map(parameter).collect(),
+            logs: order.into_iter().map(of_log).collect(),
+        })
     }
 
     /// What the numbers are to be read with.
@@ -661,6 +653,12 @@ impl FleetResult {
             out.push(
                 "robots that do not always carry the same need a recipe that lets logs differ in it: `dynid reduce --payload LINK`".to_owned(),
             );
+        }
+        if !self.carried.is_empty() && self.built.halves.len() < LEAST_HALVED {
+            out.push(format!(
+                "deviations of what logs carried are those of noise alone: {} logs with rows in both halves of their time, expected {LEAST_HALVED} to tell how far they scatter beyond it",
+                self.built.halves.len()
+            ));
         }
         for (r, influence) in fit.influence.iter().enumerate().filter(|(_, i)| **i > INFLUENCE) {
             out.push(format!(
