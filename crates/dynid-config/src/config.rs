@@ -81,6 +81,9 @@ pub struct Config {
     pub bound: Vec<BoundConfig>,
     /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
     pub preferred: Vec<String>,
+    /// Take elastic joints without torque sensors as stiff ones, read at their motors, even where rows of links and motors bear a stiffness out;
+    /// their stiffness is that of their deformation. `dynid reduce` does so by itself. Default false.
+    pub stiff_joints: bool,
     /// Trajectory file of every `[[log]]` that states neither `trajectory` nor `period_s` of its own.
     pub trajectory: Option<PathBuf>,
     /// Period of every `[[log]]` that states neither, s.

@@ -82,8 +82,10 @@ impl Config {
         let sources = &found.sources[..found.logs.len()];
         let stated = |log: &LogConfig| log.columns.clone().unwrap_or_else(|| self.columns.clone());
         let mut own = self.log.iter().zip(sources).map(|(log, source)| match &source.mapping {
-            // What was read of motors, on the side of the joints.
-            Some(mapping) if found.taken_as_stiff => MappingSpec::from(mapping).read_as(&stated(log)),
+            // What was read of motors, on the side of the joints; who asked for that goes on reading both sides.
+            Some(mapping) if !found.stiff_joints.is_empty() && !found.settings.stiff_joints => {
+                MappingSpec::from(mapping).read_as(&stated(log))
+            }
             _ => stated(log),
         });
         let columns = match own.next() {

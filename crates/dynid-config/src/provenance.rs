@@ -47,6 +47,9 @@ impl Config {
         if let Some(table) = &self.instruments {
             settings["instruments"] = json!(table);
         }
+        if self.stiff_joints {
+            settings["stiff_joints"] = json!(true);
+        }
         if !self.payload.is_empty() {
             settings["payload"] = json!(self.payload);
         }

@@ -40,7 +40,9 @@ pub use instruments::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd
 pub use log_fit::log_fit;
 pub(crate) use log_fit::{by_motion, pool};
 pub use loops::{ClosureKind, ClosureRecord, FrameRecord, LoopsRecord};
-pub use model::{CouplingRecord, JointRecord, JointType, LinkRecord, ModelRecord, SettingRecord};
+pub use model::{
+    CouplingRecord, ElasticRecord, JointRecord, JointType, LinkRecord, ModelRecord, SettingRecord,
+};
 pub use reading::{MotorSide, ReadingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PriorTrialRecord, PruningRecord, PruningStep,

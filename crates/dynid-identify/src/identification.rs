@@ -35,6 +35,7 @@ use crate::robot::Robot;
 use crate::searches::Searches;
 use crate::settings::{LogSettings, Settings};
 use crate::shape::{self, ShapeFit};
+use crate::stiffness::StiffJoint;
 use crate::tie_test::TieTest;
 use crate::trained_log::{RowFit, TrainedLog};
 use crate::trust::Trust;
@@ -72,8 +73,8 @@ pub struct Identification {
     /// Stiffness of elastic joints by their deformation; empty without encoders on both sides of gears, and where sensors
     /// measure the load.
     pub stiffness: Vec<JointStiffness>,
-    /// Whether elastic joints were taken as stiff, since the deformation did not bear out the stiffness of the fit.
-    pub taken_as_stiff: bool,
+    /// Elastic joints that were taken as stiff ones, since the deformation did not bear out the stiffness of the fit, or since that was asked for.
+    pub stiff_joints: Vec<StiffJoint>,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
     /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none

@@ -60,7 +60,8 @@ pub use step::Step;
 /// Logs are taken by value, since a long one may be most of the memory: clone what is to be kept.
 ///
 /// Elastic joints without sensors of their load, whose stiffness in the fit is not borne out by the deformation that their encoders show,
-/// are taken as stiff ones: the result is that of [`Identification::stiffness`] beside a model of stiff joints.
+/// are taken as stiff ones: the result is that of [`Identification::stiffness`] beside a model of stiff joints. [`Settings::stiff_joints`] asks
+/// for that in any case.
 ///
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
@@ -70,30 +71,44 @@ pub fn identify(
     settings: &Settings,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Identification, Error> {
+    let elastic = &robot.elements.elastic;
+    if settings.stiff_joints && elastic.iter().all(|spec| spec.sensor) {
+        let found = if elastic.is_empty() { "none that is `elastic`" } else { "torque sensors" };
+        return Err(Error::setting("stiff_joints", "elastic joints without torque sensors", found));
+    }
     let logs: Vec<Log> = logs.into_iter().collect();
     // A second look at elastic joints needs their logs once more.
-    let kept = if robot.elements.elastic.is_empty() { Vec::new() } else { logs.clone() };
+    let kept = if elastic.is_empty() { Vec::new() } else { logs.clone() };
     let mut found = run(robot.clone(), logs, settings, progress)?;
     let stiffness = stiffness::of(&found)?;
-    if stiffness.iter().all(JointStiffness::is_borne_out) {
+    let borne_out = stiffness.iter().all(JointStiffness::is_borne_out);
+    let asked = settings.stiff_joints;
+    if asked && stiffness.is_empty() {
+        let what = "no log shows a deformation of the joints (gaps, records of less than half a second), which `stiff_joints` needs";
+        return Err(Error::Unsupported(what.to_owned()));
+    }
+    if borne_out && !asked {
         found.stiffness = stiffness;
         return Ok(found);
     }
     let doubts = elastic::warnings(&found.model, &found.logs);
+    let stiff_joints = stiffness::stiff_joints(&found);
     drop(found);
-    let logs = kept.into_iter().map(|log| stiffness::at_motors(log, &robot.elements.elastic));
+    let logs = kept.into_iter().map(|log| stiffness::at_motors(log, elastic, false));
     let logs = logs.collect::<Result<Vec<_>, Error>>()?;
     let settings = stiffness::stiff_settings(settings, robot);
     let mut found = run(stiffness::stiff_robot(robot)?, logs, &settings, progress)?;
     found.warnings.extend(doubts);
-    let message = format!(
-        "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
-         motors, and their stiffness is that of the deformation: {}",
-        stiffness.iter().map(JointStiffness::words).collect::<Vec<_>>().join("; ")
-    );
-    found.warnings.push(Caution::warn(caution::SPRING, message, joint_stiffness::REMEDY));
+    if !borne_out {
+        let message = format!(
+            "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
+             motors, and their stiffness is that of the deformation: {}",
+            stiffness.iter().map(JointStiffness::words).collect::<Vec<_>>().join("; ")
+        );
+        found.warnings.push(Caution::warn(caution::SPRING, message, joint_stiffness::REMEDY));
+    }
     found.stiffness = stiffness;
-    found.taken_as_stiff = true;
+    found.stiff_joints = stiff_joints;
     Ok(found)
 }
 
@@ -260,7 +275,7 @@ pub(crate) fn assemble(
     let mut out = Identification {
         sources,
         stiffness: Vec::new(),
-        taken_as_stiff: false,
+        stiff_joints: Vec::new(),
         plan,
         base_scales: space.base_std().to_vec(),
         base,

@@ -5,19 +5,22 @@
 //! the sums of link and motor rows, in which the spring is gone. Where this does not bear out the stiffness that the fit of the
 //! robot's rows found, the joints are taken as stiff ones, and the stiffness stands beside the model.
 
+mod deformed;
 mod rows;
 mod stiff;
 
 use dynid_clearance::deformation::{Deformation, Evidence, fit, judge};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, MotionBlock, RobotModel};
+use dynid_robots::ElasticSpec;
 use dynid_rows::conditioning::PreparedLog;
 
 use crate::Error;
 use crate::elements::ElementPlan;
 use crate::identification::Identification;
 pub use crate::joint_stiffness::{JointStiffness, StiffnessVerdict};
+pub(crate) use deformed::{Deformed, Sieve, Smooth};
 use rows::{LogRows, rows};
-pub(crate) use stiff::{at_motors, stiff_robot, stiff_settings};
+pub(crate) use stiff::{BEHIND_GEAR, at_motors, stiff_robot, stiff_settings};
 
 /// The record of the links is moved by the lag found so often.
 const ROUNDS: usize = 3;
@@ -72,6 +75,38 @@ pub(crate) fn of(id: &Identification) -> Result<Vec<JointStiffness>, Error> {
     let Some((all, found, here)) = last else { return Ok(Vec::new()) };
     let one = |(j, spring)| told(id, spring, j, (&all, &found), here);
     Ok(springs.iter().enumerate().map(one).collect())
+}
+
+/// An elastic joint that was taken as a stiff one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StiffJoint {
+    /// The joint as its robot file has it.
+    pub spec: ElasticSpec,
+    /// Parameters whose efforts load it: those of its link's row but friction and the spring.
+    pub loads: Vec<String>,
+}
+
+/// Elastic joints of an identification, for them to be taken as stiff ones.
+pub(crate) fn stiff_joints(id: &Identification) -> Vec<StiffJoint> {
+    let (model, table) = (&id.model, id.model.parameters());
+    let none = vec![0.0; model.outputs().len()];
+    let channels: Vec<(&str, &[f64])> = match id.logs.first() {
+        Some(log) => log.channels.iter().map(|c| (c.name.as_str(), &c.values[..1])).collect(),
+        None => Vec::new(),
+    };
+    let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(1, &none, &none, &none) };
+    let joint = |spring: &Spring| {
+        let name = &model.outputs()[spring.link].name;
+        let spec = id.plan.elastic.iter().find(|spec| spec.joint == *name)?.clone();
+        let friction = model.friction_columns(spring.link, &table.shape_start(), &motion);
+        let loads = model
+            .layout()
+            .columns(spring.link)
+            .iter()
+            .filter(|c| !spring.columns.contains(c) && friction.iter().all(|(column, _)| column != *c));
+        Some(StiffJoint { spec, loads: loads.map(|c| table.linear[*c].name.clone()).collect() })
+    };
+    springs(model).iter().filter_map(joint).collect()
 }
 
 /// What to know about a stiffness where the deformation is not asked, in words.

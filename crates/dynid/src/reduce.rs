@@ -36,12 +36,16 @@ pub struct OwnOfLogs {
 
 /// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it.
 ///
+/// Elastic joints without torque sensors are taken as stiff ones, read at their motors; their deformations become rows of their own.
+///
 /// # Errors
 /// As [`crate::identify()`], [`Identification::recipe`], [`Recipe::with_payload`] and [`Reducer::reduce`].
 pub fn learn(config: &Config, own: &OwnOfLogs, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
     let mut config = config.clone();
+    let robot = config.read_robot()?;
+    config.stiff_joints |= robot.elements.elastic.iter().any(|spec| !spec.sensor);
     if let Some(link) = &own.payload {
-        check_payload_link(&config.read_robot()?, link)?;
+        check_payload_link(&robot, link)?;
         // The columns of the link come first, so that they are kept.
         let of_link = payload_columns(link);
         config.preferred.retain(|name| !of_link.contains(name));

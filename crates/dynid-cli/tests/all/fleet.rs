@@ -270,6 +270,107 @@ fn delays_that_change_are_found() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("learn it with `--delays`"));
 }
 
+/// Two links, each with encoders on both sides of its gear.
+const SPRINGS: &str = r#"
+schema = 1
+name = "elastic-arm"
+gravity = [0, -9.81, 0]
+dh = "modified"
+[[joint]]
+name = "j1"
+limits = { position = ["-150deg", "150deg"], velocity = 2.0, effort = 200.0 }
+phi = [8.0, 2.0, 0.1, 0, 0.15, 0, 0, 0.85, 0, 0.9]
+[[joint]]
+name = "j2"
+a = 0.5
+limits = { position = ["-150deg", "150deg"], velocity = 2.5, effort = 80.0 }
+phi = [4.0, 0.8, -0.05, 0, 0.05, 0, 0, 0.28, 0, 0.3]
+[element.j1]
+elements = []
+elastic = { ratio = 100, k1 = 40000.0, cubic = false }
+[element.j1_motor]
+elements = ["coulomb", "viscous", "rotor"]
+coulomb = { effort = 0.08 }
+viscous = { coefficient = 4e-4 }
+rotor = { inertia = 1.2e-4 }
+[element.j2]
+elements = []
+elastic = { ratio = -80, motor = "m2", k1 = 20000.0, cubic = false }
+[element.m2]
+elements = ["coulomb", "viscous", "rotor"]
+coulomb = { effort = 0.04 }
+viscous = { coefficient = 2e-4 }
+rotor = { inertia = 6e-5 }
+"#;
+
+/// Encoders on both sides of gears tell which spring has softened and which gear has play, when, and by how much.
+#[test]
+fn springs_that_soften_and_gears_that_wear_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("arm.toml"), SPRINGS).unwrap();
+    let settings = "duration_s = 8\nrate_hz = 100\n[fleet]\nrobots = 12\nlogs = 12\nstiffness = 2\nbacklash = 2\n\
+                    between_robots = { fc = 0.2, fv = 0.25, k1 = 0.05 }\nbetween_logs = { fc = 0.04, fv = 0.06, k1 = 0.005 }\n";
+    std::fs::write(at.join("fleet.toml"), settings).unwrap();
+    run(
+        at,
+        &["simulate", "arm.toml", "--config", "fleet.toml", "--seed", "5", "--out", "made", "--quiet"],
+        0,
+    );
+    let logs = ["--log", "made/logs/r001-001.csv.gz", "--log", "made/logs/r002-001.csv.gz"];
+    run(at, &[&["reduce", "arm.toml", "--out", "type.factors", "--quiet"], &logs[..]].concat(), 0);
+    run(at, &["reduce", "type.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"], 0);
+    run(at, &["fleet", "factors", "--out", "whole", "--quiet"], 0);
+    let (found, truth) = (read(&at.join("whole/fleet.json")), read(&at.join("made/truth.json")));
+    let robots = found["robots"].as_array().unwrap();
+    let number = |value: &Value| value.as_f64().unwrap();
+    let mut told = [0, 0];
+    for change in truth["changes"].as_array().unwrap() {
+        let (name, put_in) = (change["parameter"].as_str().unwrap(), number(&change["size"]));
+        let (joint, symbol) = name.rsplit_once('.').unwrap();
+        let robot = robots.iter().find(|r| r["name"] == change["robot"]).unwrap();
+        let is_stiffness = symbol == "k1";
+        let parameter = if is_stiffness { format!("{joint}.compliance") } else { name.to_owned() };
+        let of_robot = |log: &&Value| log["robot"] == change["robot"];
+        let own = truth["logs"].as_array().unwrap().iter().filter(of_robot);
+        let last = own.max_by(|a, b| number(&a["start_s"]).total_cmp(&number(&b["start_s"]))).unwrap();
+        let expected = match is_stiffness {
+            true => {
+                let after = number(&last["parameters"][name]);
+                1.0 / after - 1.0 / (after - put_in)
+            }
+            false => number(&last["parameters"][name]),
+        };
+        let own = robot["parameters"].as_array().unwrap().iter().find(|p| p["name"] == parameter).unwrap();
+        // A load that keeps its sign shows no play.
+        if own["detectable"].as_f64().is_none_or(|least| least > expected.abs()) {
+            continue;
+        }
+        let found =
+            robot["changes"].as_array().unwrap().iter().find(|c| c["parameter"] == parameter).unwrap();
+        // Friction behind the spring that no recipe knows makes play come out too small.
+        let least = if is_stiffness { 0.95 } else { 0.8 };
+        assert!((least..1.05).contains(&(number(&found["size"]) / expected)), "{found} {expected:e}");
+        told[usize::from(is_stiffness)] += 1;
+    }
+    assert!(told[0] > 0 && told[1] == 2, "{told:?} {}", truth["changes"]);
+    for robot in robots.iter().filter(|r| r["changes"] != Value::Array(Vec::new())) {
+        let put_in = truth["changes"].as_array().unwrap().iter().any(|c| c["robot"] == robot["name"]);
+        assert!(put_in, "{robot}");
+    }
+    // Models are those of stiff joints; robot files have no place for a compliance.
+    let of_type = read(&at.join("whole/type.json"));
+    assert!(parameters(&of_type).all(|(name, _)| !name.ends_with(".compliance") && !name.ends_with(".k1")));
+    run(at, &["export", "whole/type.json", "--urdf", "type.urdf", "--quiet"], 0);
+    // A log without its links is a failure by itself.
+    let log = std::fs::read(at.join("made/logs/r003-001.csv.gz")).unwrap();
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(&log[..]), &mut text).unwrap();
+    std::fs::write(at.join("motors.csv"), text.replacen("q_j2", "unknown", 1)).unwrap();
+    let output = run(at, &["reduce", "type.factors", "--log", "motors.csv", "--out", "x.factors"], 2);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("j2"), "{output:?}");
+}
+
 /// Logs in which a robot carries what nobody stated: what it was is told to its deviation, and friction that changes is found beside it; by a recipe
 /// that knows of no payload it is not.
 #[test]

@@ -44,6 +44,7 @@ impl Config {
             settings.law = self.law.clone();
             settings.tie = self.tie.clone();
             settings.preferred = self.preferred.clone();
+            settings.stiff_joints = self.stiff_joints;
             settings.payload = self.payload.clone();
             settings.files = RunFiles {
                 config: self.file.clone(),

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use dynid_identify::Error;
-use dynid_identify::reduction::DELAY;
+use dynid_identify::reduction::{BACKLASH, DELAY};
 use dynid_identify::robot::Robot;
 use dynid_model::inertia::PARAMETER_NAMES;
 use dynid_model::{Inertia, Mat3, Vec3};
 use dynid_motion::shift::shift;
+use dynid_robots::ElasticSpec;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -27,6 +28,10 @@ const TEMPERATURE: f64 = 25.0;
 const OUTLIER: f64 = 8.0;
 /// Spread of delays between robots and between logs, samples.
 const DELAY_SPREAD: (f64, f64) = (0.1, 0.03);
+/// Symbol of a stiffness.
+const STIFFNESS: &str = "k1";
+/// Share of the largest deformation within which backlash passes from flank to flank.
+const FLANK: f64 = 0.02;
 /// Distance of the middle of a payload from the axes of its link at most, m.
 const PAYLOAD_REACH: f64 = 0.08;
 /// Radius of gyration of a payload about its middle, m.
@@ -56,6 +61,8 @@ pub struct VirtualFleet {
     table: FleetTable,
     /// Parameters of the type.
     pub nominal: Vec<(String, f64)>,
+    /// Joints with encoders on both sides of their gears.
+    springs: Vec<ElasticSpec>,
     /// Per robot: parameters.
     robots: Vec<BTreeMap<String, f64>>,
     /// Changes that were put in.
@@ -128,7 +135,16 @@ impl VirtualFleet {
                 }
             }
         }
+        let springs = robot.elements.elastic.clone();
+        if table.stiffness > 0 && springs.is_empty() {
+            return Err(Error::setting("fleet.stiffness", "0, since no joint is `elastic`", table.stiffness));
+        }
+        if table.backlash > 0 && springs.iter().all(|spec| spec.sensor) {
+            let expected = "0, since no joint is `elastic` without torque sensor";
+            return Err(Error::setting("fleet.backlash", expected, table.backlash));
+        }
         let mut out = VirtualFleet {
+            springs,
             settings: settings.clone(),
             table,
             nominal,
@@ -199,6 +215,20 @@ impl VirtualFleet {
             let date_s = FIRST_DAY + DAY * table.days * rng.random_range(0.25..0.75);
             self.changes.push(PlannedChange { robot, parameter, kind: "step", size, date_s });
         }
+        for n in 0..table.stiffness + table.backlash {
+            let robot = name(take(&mut rng));
+            let [symbol, kind] = if n < table.stiffness { [STIFFNESS, "step"] } else { [BACKLASH, "ramp"] };
+            let may = |spec: &&ElasticSpec| symbol == STIFFNESS || !spec.sensor;
+            let joints: Vec<&ElasticSpec> = self.springs.iter().filter(may).collect();
+            let parameter = format!("{}.{symbol}", joints[rng.random_range(0..joints.len())].joint);
+            let size = match symbol {
+                STIFFNESS => -rng.random_range(0.1..0.3) * self.size(&parameter),
+                _ => rng.random_range(3e-4..1e-3),
+            };
+            let at = if kind == "step" { rng.random_range(0.25..0.75) } else { rng.random_range(0.2..0.7) };
+            let date_s = FIRST_DAY + DAY * table.days * at;
+            self.changes.push(PlannedChange { robot, parameter, kind, size, date_s });
+        }
         for r in 0..table.robots {
             let odd =
                 outliers.iter().find(|(robot, _)| *robot == r).map(|(_, joint)| joints[*joint].as_str());
@@ -247,15 +277,18 @@ impl VirtualFleet {
         let hit = rng.random_range(0.0..1.0) < self.table.broken && !joints.is_empty();
         let broken = hit.then(|| joints[rng.random_range(0..joints.len())].clone());
         let mut parameters = self.robots[r].clone();
-        let mut delays: Vec<(String, f64)> = Vec::new();
+        let mut beside: Vec<(String, f64)> = Vec::new();
+        if self.table.backlash > 0 {
+            beside.extend(self.springs.iter().map(|spec| (format!("{}.{BACKLASH}", spec.joint), 0.0)));
+        }
         for joint in joints.iter().filter(|_| self.table.delays > 0) {
             let sample = 1.0 / self.settings.rate_hz;
             let of_robot = DELAY_SPREAD.0 * sample * normal(&mut self.rng(&format!("delay {r} {joint}")));
             let of_log = DELAY_SPREAD.1 * sample * normal(&mut self.rng(&format!("delay {r} {l} {joint}")));
-            delays.push((format!("{joint}.{DELAY}"), of_robot));
+            beside.push((format!("{joint}.{DELAY}"), of_robot));
             parameters.insert(format!("{joint}.{DELAY}"), of_robot + of_log);
         }
-        for (parameter, _) in self.nominal.iter().chain(&delays) {
+        for (parameter, _) in self.nominal.iter().chain(&beside) {
             let (joint, symbol) = parts(parameter);
             let size = self.size(parameter);
             let mut change = 0.0;
@@ -315,8 +348,9 @@ impl VirtualFleet {
         let VirtualLog { parameters, .. } = self.about(index);
         let seed = self.rng(&format!("motion {index}")).random();
         let mut values = self.settings.values.clone();
-        let is_delay = |parameter: &String| parts(parameter).1 == DELAY;
-        values.extend(parameters.iter().filter(|(p, _)| !is_delay(p)).map(|(p, v)| (p.clone(), *v)));
+        let is = |parameter: &String, symbol: &str| parts(parameter).1 == symbol;
+        let of_model = |p: &String| !is(p, DELAY) && !is(p, BACKLASH);
+        values.extend(parameters.iter().filter(|(p, _)| of_model(p)).map(|(p, v)| (p.clone(), *v)));
         let carried = self.payload(index / self.table.logs, index % self.table.logs);
         if let (Some(Inertia(carried)), Some(last)) = (carried, robot.mechanism.sweep().last().copied()) {
             let link = &robot.mechanism.bodies()[last].name;
@@ -327,7 +361,12 @@ impl VirtualFleet {
         }
         let settings = SimulateSettings { values, seed, fleet: None, ..self.settings.clone() };
         let mut log = simulate(robot, &settings)?;
-        for (parameter, delay) in parameters.iter().filter(|(p, _)| is_delay(p)) {
+        for spec in &self.springs {
+            if let Some(gap) = parameters.get(&format!("{}.{BACKLASH}", spec.joint)) {
+                put_backlash(&mut log, spec, *gap);
+            }
+        }
+        for (parameter, delay) in parameters.iter().filter(|(p, _)| is(p, DELAY)) {
             let joint = log.joints.iter().position(|joint| joint == parts(parameter).0);
             if let Some(effort) = joint.map(|j| &mut log.effort[j]) {
                 // The effort runs ahead of the motion.
@@ -336,5 +375,17 @@ impl VirtualFleet {
             }
         }
         Ok(log)
+    }
+}
+
+/// Lets the record of a link lie on the flank that its load presses on, half a gap from where it was.
+fn put_backlash(log: &mut SimulatedLog, spec: &ElasticSpec, gap: f64) {
+    let place = |name: &String| log.joints.iter().position(|joint| joint == name);
+    let (Some(link), Some(motor)) = (place(&spec.joint), place(&spec.motor)) else { return };
+    let pairs = log.clean[0][motor].iter().zip(&log.clean[0][link]);
+    let deformation: Vec<f64> = pairs.map(|(motor, link)| motor / spec.ratio - link).collect();
+    let width = FLANK * deformation.iter().fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+    for (q, x) in log.position[link].iter_mut().zip(&deformation) {
+        *q -= 0.5 * gap * (x / width).tanh();
     }
 }

@@ -35,6 +35,11 @@ pub struct FleetTable {
     /// Robots in which the delay of the motion behind the effort of a joint grows at once by 0.3 to 1 samples. The delays of all joints then differ
     /// by 0.1 samples between robots, and by 0.03 between logs. Default 0.
     pub delays: usize,
+    /// Robots in which the stiffness `k1` of an elastic joint falls at once by 10 to 30 %. Default 0.
+    pub stiffness: usize,
+    /// Robots in which backlash of 0.3 to 1 mrad (mm where it slides) grows in the gear of an elastic joint without torque sensor until the end, evenly from
+    /// 20 to 70 % of the time on: the record of the link holds it, on one flank or the other as the load presses. Default 0.
+    pub backlash: usize,
     /// Largest mass that the last link carries, kg: in half of the logs nothing, in the others a body of a mass of its own, up to this one. Default 0.
     pub payload: f64,
     /// Share of the logs in which one joint is off by 15 standard deviations. Default 0.
@@ -56,6 +61,8 @@ impl Default for FleetTable {
             wear: 0,
             faults: 0,
             delays: 0,
+            stiffness: 0,
+            backlash: 0,
             payload: 0.0,
             broken: 0.0,
         }
@@ -64,14 +71,15 @@ impl Default for FleetTable {
 
 impl FleetTable {
     pub(super) fn check(&self) -> Result<(), Error> {
-        let special = self.outliers + self.wear + self.faults + self.delays;
+        let FleetTable { outliers, wear, faults, delays, stiffness, backlash, .. } = self;
+        let special = outliers + wear + faults + delays + stiffness + backlash;
         let counts = [
             ("fleet.robots", self.robots >= 1, "at least 1", self.robots),
             ("fleet.logs", self.logs >= 1, "at least 1", self.logs),
             (
                 "fleet.outliers",
                 special <= self.robots,
-                "as many robots as outliers, wear, faults and delays need",
+                "as many robots as outliers, wear, faults, delays, stiffness and backlash need",
                 special,
             ),
         ];

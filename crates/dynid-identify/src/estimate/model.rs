@@ -99,7 +99,7 @@ pub struct ElasticRecord {
 }
 
 impl ElasticRecord {
-    fn new(e: &ElasticSpec) -> Self {
+    pub(crate) fn new(e: &ElasticSpec) -> Self {
         ElasticRecord {
             joint: e.joint.clone(),
             motor: e.motor.clone(),
@@ -110,7 +110,7 @@ impl ElasticRecord {
         }
     }
 
-    fn spec(&self) -> Result<ElasticSpec, Error> {
+    pub(crate) fn spec(&self) -> Result<ElasticSpec, Error> {
         if !(self.ratio.is_finite() && self.ratio != 0.0) {
             return Err(Error::setting("elastic.ratio", "a finite number other than 0", self.ratio));
         }

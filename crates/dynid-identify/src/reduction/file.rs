@@ -173,7 +173,7 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         .as_ref()
         .or(known.map(|(recipe, _)| recipe))
         .ok_or_else(|| Fault::Description(beside.to_owned()))?;
-    let (outputs, scales) = (by.outputs.len(), by.choices.scales_hz.len());
+    let outputs = by.outputs.len();
     let columns = by.all_columns().len();
     let mut out: Vec<ReducedLog> = Vec::new();
     for LogEntry { key: expected, facts, bytes, sha256 } in logs {
@@ -191,8 +191,7 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         if out.last().is_some_and(|last| last.key >= expected) {
             return wrong("logs are not in the order of their keys");
         }
-        if groups.is_empty()
-            || groups.iter().any(|g| g.output >= outputs || g.scale >= scales || g.blocks.is_empty())
+        if groups.is_empty() || groups.iter().any(|g| !by.has_group(g.output, g.scale) || g.blocks.is_empty())
         {
             return wrong("factors of an effort or kernel that the recipe does not have");
         }

@@ -27,7 +27,9 @@ mod file;
 mod pooled;
 mod recipe;
 mod reduce;
+mod shapes;
 mod solve;
+mod springs;
 mod stream;
 mod windows;
 
@@ -48,6 +50,7 @@ pub use file::VERSION;
 pub use pooled::Pooled;
 pub use recipe::{Blocks, Choices, Column, DELAY, Output, Recipe, check_payload_link, payload_columns};
 pub use reduce::{Reducer, WindowSettings};
+pub use springs::{BACKLASH, COMPLIANCE, HYSTERESIS, LAG, Spring, Springs};
 
 /// What is left of a log: its factors, and what has to be known of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use dynid_estimate::consistent::Bound;
-use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
 use dynid_factor::groups::ReducedGroup;
 use dynid_model::inertia::PARAMETER_NAMES;
 use dynid_model::{EffortModel, Owner, Parameter, RobotModel};
@@ -12,17 +11,19 @@ use dynid_motion::cutoff::KernelLimit;
 use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
 use serde::{Deserialize, Serialize};
 
+use super::shapes::Shapes;
+use super::springs::Springs;
 use super::{ReductionError, plain};
 use crate::Error;
 use crate::check::{CheckName, CheckResult};
-use crate::estimate::{InputKind, InputRecord, ModelRecord, ReadingRecord};
+use crate::estimate::{ElasticRecord, InputKind, InputRecord, ModelRecord, ReadingRecord};
 use crate::friction_power::FrictionPower;
 use crate::identification::Identification;
 use crate::passivity::velocities;
 use crate::problem::Problem;
 use crate::robot::Robot;
 use crate::settings::{ConditioningConfig, EstimatorConfig, Method, Preflight, Route, Settings};
-use crate::shape::{self, ShapeFit};
+use crate::shape::ShapeFit;
 use crate::structure::Structure;
 use crate::training_log::TrainingLog;
 use crate::verdict::{self, Status};
@@ -77,6 +78,9 @@ pub struct Recipe {
     /// Link whose parameters are columns of their own, since every log may carry something else on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     payload: Option<String>,
+    /// Joints with encoders on both sides of their gears: read at their motors, their deformations outputs of their own behind those of the model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub springs: Option<Springs>,
     /// Checks of the identification behind it that did not pass and that factors cannot repeat.
     pub doubts: Vec<CheckResult>,
 }
@@ -107,32 +111,6 @@ pub struct Column {
     pub unit: String,
     /// Size of the parameter: standard deviation that its prior leaves, in its unit.
     pub scale: f64,
-}
-
-/// Shape parameters and the point about which a model is linear.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Shapes {
-    linear: Vec<f64>,
-    shape: Vec<f64>,
-    findings: Vec<Finding>,
-}
-
-/// What the logs of the recipe said of a shape parameter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Finding {
-    verdict: FindingVerdict,
-    /// At its lower (`false`) or upper bound.
-    at_upper_bound: Option<bool>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum FindingVerdict {
-    Seen,
-    OneSided { lower: f64, upper: f64 },
-    NotSeen,
-    Held,
-    NotJudged,
 }
 
 /// Choices of the conditioning.
@@ -203,7 +181,7 @@ impl Identification {
     ///
     /// # Errors
     /// [`Error::Unsupported`] for what no factor of single logs holds: the textbook route, robust losses and instruments, which look at
-    /// single rows; terms of single logs; elastic joints, whose stiffness is told by the deformation.
+    /// single rows; terms of single logs; elastic joints that were not taken as stiff ones ([`Settings::stiff_joints`]).
     pub fn recipe(&self) -> Result<Recipe, Error> {
         let Some(found) =
             self.conditioning.as_ref().filter(|_| self.settings.conditioning.route != Route::Textbook)
@@ -237,8 +215,11 @@ impl Identification {
         if !self.plan.log_terms.is_empty() || !self.own_delays.is_empty() {
             return Err(not_reduced("terms of single logs", "leave out `payload` and `own`"));
         }
-        if !self.plan.elastic.is_empty() || self.taken_as_stiff {
-            return Err(not_reduced("elastic joints", "use the robot file without `elastic`"));
+        if !self.plan.elastic.is_empty() && !self.plan.is_measured() {
+            return Err(not_reduced(
+                "rows of elastic joints",
+                "take them as stiff ones by `stiff_joints = true`, as `dynid reduce` does by itself",
+            ));
         }
         if self.loads.is_some() {
             let instead = "identify from the logs, or state other friction and `clearance = \"ideal\"` under `[elements]`";
@@ -297,6 +278,7 @@ impl Identification {
             reading: ReadingRecord::default(),
             delays: false,
             payload: None,
+            springs: Springs::of(self)?,
             doubts: doubts(self),
             model,
         })
@@ -397,7 +379,7 @@ impl Recipe {
         self.payload.as_deref()
     }
 
-    /// Columns of factors: [`Recipe::columns`], and where they have them those of the rest of delays, a sample in size.
+    /// Columns of factors: [`Recipe::columns`], and where they have them those of the rest of delays, a sample in size, and those of deformations.
     pub fn all_columns(&self) -> Vec<Column> {
         let delay = |output: &Output| Column {
             name: format!("{}.{DELAY}", output.name),
@@ -405,7 +387,57 @@ impl Recipe {
             scale: 1.0 / self.choices.rate_hz,
         };
         let delays = self.outputs.iter().filter(|_| self.delays).map(delay);
-        self.columns.iter().cloned().chain(delays).collect()
+        let springs = self.springs.iter().flat_map(Springs::columns).cloned();
+        self.columns.iter().cloned().chain(delays).chain(springs).collect()
+    }
+
+    /// Columns of the rows of efforts: those behind them are of deformations.
+    pub(super) fn columns_of_efforts(&self) -> usize {
+        self.columns.len() + if self.delays { self.outputs.len() } else { 0 }
+    }
+
+    /// What shares a variance of its noise in a log: a name, and the cut-off of the kernel, Hz, absent for deformations. Every output with every kernel,
+    /// then the deformations.
+    pub fn channels(&self) -> Vec<(String, Option<f64>)> {
+        let of_output = |output: &Output| {
+            let name = output.name.clone();
+            self.choices.scales_hz.iter().map(move |hz| (name.clone(), Some(*hz))).collect::<Vec<_>>()
+        };
+        let springs = self.springs.iter().flat_map(|springs| &springs.joints);
+        let deformations = springs.map(|spring| (format!("deformation of {}", spring.elastic.joint), None));
+        self.outputs.iter().flat_map(of_output).chain(deformations).collect()
+    }
+
+    /// Place of a group among [`Recipe::channels`].
+    pub fn channel(&self, group: &ReducedGroup) -> usize {
+        let (outputs, scales) = (self.outputs.len(), self.choices.scales_hz.len());
+        match group.output.checked_sub(outputs) {
+            None => group.output * scales + group.scale,
+            Some(deformation) => outputs * scales + deformation,
+        }
+    }
+
+    /// The joint whose deformation a column of factors is of, as a place among [`Springs::joints`]; `None` for columns of efforts.
+    pub fn deformation_of(&self, column: usize) -> Option<usize> {
+        let mut behind = column.checked_sub(self.columns_of_efforts())?;
+        self.springs.as_ref()?.joints.iter().position(|spring| {
+            match behind.checked_sub(spring.columns.len()) {
+                None => true,
+                Some(rest) => {
+                    behind = rest;
+                    false
+                }
+            }
+        })
+    }
+
+    /// Whether there may be a group of this output and kernel.
+    pub(super) fn has_group(&self, output: usize, scale: usize) -> bool {
+        let deformations = self.springs.as_ref().map_or(0, |springs| springs.joints.len());
+        match output < self.outputs.len() {
+            true => scale < self.choices.scales_hz.len(),
+            false => output < self.outputs.len() + deformations && scale == 0,
+        }
     }
 
     /// Per column of factors ([`Recipe::all_columns`]) the parameter that stands for it.
@@ -426,7 +458,9 @@ impl Recipe {
             fold_first: false,
         };
         let delays = self.outputs.iter().enumerate().filter(|_| self.delays).map(delay);
-        Ok(problem.structure.base.kept.iter().map(|c| table[*c].clone()).chain(delays).collect())
+        let springs = self.springs.iter().flat_map(Springs::parameters);
+        let of_base = problem.structure.base.kept.iter().map(|c| table[*c].clone());
+        Ok(of_base.chain(delays).chain(springs).collect())
     }
 
     /// Returns the recipe with how its logs were read, for other logs to be read alike.
@@ -455,6 +489,9 @@ impl Recipe {
                 joint.ok_or_else(|| contradiction(format!("limits of `{}`, no joint", limit.joint)))?;
             (joint.limits.velocity, joint.limits.effort) = (limit.velocity, limit.effort);
         }
+        // Logs have columns for motors.
+        file.elements.elastic =
+            self.model.elastic.iter().map(ElasticRecord::spec).collect::<Result<_, _>>()?;
         let path = self.inputs.first().map_or_else(|| self.robot.clone(), |input| input.path.clone());
         let robot = Robot::of_parts(Path::new(&path), file)?;
         let mut plan = self.model.plan(&robot.mechanism)?.with_loops(robot.closed.clone());
@@ -524,6 +561,9 @@ impl Recipe {
         {
             return contradiction("choices that no conditioning makes");
         }
+        if self.springs.as_ref().is_some_and(|springs| !springs.fit(&self.outputs)) {
+            return contradiction("deformations of other joints, or of no number");
+        }
         let Blocks { most, merged, wanted_s } = self.blocks;
         if most == 0 || merged == 0 || !wanted_s.is_finite() || wanted_s < 0.0 {
             return contradiction("time blocks of no length");
@@ -574,63 +614,6 @@ impl Recipe {
 pub(super) struct Solved {
     pub(super) shapes: Option<ShapeFit>,
     pub(super) power: FrictionPower,
-}
-
-impl Shapes {
-    fn of(found: &ShapeFit) -> Self {
-        let finding = |f: &ShapeFinding| Finding {
-            verdict: match f.verdict {
-                ShapeVerdict::Seen => FindingVerdict::Seen,
-                ShapeVerdict::OneSided { lower, upper } => FindingVerdict::OneSided { lower, upper },
-                ShapeVerdict::NotSeen => FindingVerdict::NotSeen,
-                ShapeVerdict::Held => FindingVerdict::Held,
-                ShapeVerdict::NotJudged => FindingVerdict::NotJudged,
-            },
-            at_upper_bound: f.at_bound.map(|bound| bound == separable::Bound::Upper),
-        };
-        Shapes {
-            linear: found.linear.clone(),
-            shape: found.model.parameters().shape_start(),
-            findings: found.findings.iter().map(finding).collect(),
-        }
-    }
-
-    /// The nonlinear model with these shapes, and the one that is linear about them.
-    fn fit(
-        &self,
-        plan: &crate::elements::ElementPlan,
-        model: RobotModel,
-    ) -> Result<(ShapeFit, RobotModel), Error> {
-        let table = model.parameters();
-        let shapes = table.shape.len();
-        if self.shape.len() != shapes
-            || self.findings.len() != shapes
-            || self.linear.len() != table.linear.len()
-        {
-            let what = "shapes of another model".to_owned();
-            return Err(ReductionError::Contradiction { what }.into());
-        }
-        let model = model.with_shape(&self.shape);
-        let finding = |f: &Finding| ShapeFinding {
-            verdict: match f.verdict {
-                FindingVerdict::Seen => ShapeVerdict::Seen,
-                FindingVerdict::OneSided { lower, upper } => ShapeVerdict::OneSided { lower, upper },
-                FindingVerdict::NotSeen => ShapeVerdict::NotSeen,
-                FindingVerdict::Held => ShapeVerdict::Held,
-                FindingVerdict::NotJudged => ShapeVerdict::NotJudged,
-            },
-            profile: Vec::new(),
-            at_bound: f
-                .at_upper_bound
-                .map(|upper| if upper { separable::Bound::Upper } else { separable::Bound::Lower }),
-            limit: None,
-        };
-        let findings: Vec<ShapeFinding> = self.findings.iter().map(finding).collect();
-        let starts = StartReport { outcomes: Vec::new(), reached: 0, distinct: 0 };
-        let found = ShapeFit { model, linear: self.linear.clone(), findings, starts };
-        let linearised = shape::linearised(plan, &found.model, &found.linear, &found.free())?;
-        Ok((found, linearised))
-    }
 }
 
 impl Choices {

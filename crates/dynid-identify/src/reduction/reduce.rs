@@ -15,6 +15,7 @@ use crate::overlap::Overlaps;
 use crate::pipeline::{bench_with, log_cautions, preflight_on};
 use crate::preflight::Bench;
 use crate::problem::Problem;
+use crate::robot::Robot;
 use crate::settings::{LogSettings, labels};
 use crate::trained_log::TrainedLog;
 
@@ -27,6 +28,8 @@ pub struct Reducer {
     pub(super) recipe: Recipe,
     hash: String,
     pub(super) problem: Problem,
+    /// The robot as logs have it, where its elastic joints are read at their motors.
+    elastic: Option<Robot>,
     /// What logs are examined with, unless they are not to be.
     bench: Option<Bench>,
     pub(super) windows: WindowSettings,
@@ -56,7 +59,15 @@ impl Recipe {
     pub fn reducer(self) -> Result<Reducer, Error> {
         let (problem, _) = self.problem()?;
         let bench = bench_with(&problem.plan, &problem.settings, &problem.robot)?;
-        Ok(Reducer { hash: self.hash(), problem, bench, recipe: self, windows: WindowSettings::default() })
+        let elastic = self.springs.as_ref().map(|springs| springs.robot(&problem.robot)).transpose()?;
+        Ok(Reducer {
+            hash: self.hash(),
+            problem,
+            elastic,
+            bench,
+            recipe: self,
+            windows: WindowSettings::default(),
+        })
     }
 }
 
@@ -98,8 +109,8 @@ impl Reducer {
     }
 
     /// The robot, for logs to be read.
-    pub fn robot(&self) -> &crate::Robot {
-        &self.problem.robot
+    pub fn robot(&self) -> &Robot {
+        self.elastic.as_ref().unwrap_or(&self.problem.robot)
     }
 
     /// Examines a log as an identification does, conditions it as the recipe says, and reduces its rows; a log of more than
@@ -117,25 +128,36 @@ impl Reducer {
 
     /// [`Reducer::reduce`] of a log as a whole.
     pub(super) fn reduce_whole(&self, log: Log) -> Result<ReducedLog, Error> {
-        let Examined { name, log, findings, prepared, conditioned, choices } = self.examine(log)?;
+        let Examined { name, log, findings, mut prepared, conditioned, choices } = self.examine(log)?;
         let Problem { model, structure, .. } = &self.problem;
+        let mut deformations = Vec::new();
+        if let Some(springs) = &self.recipe.springs {
+            let behind = (self.recipe.outputs.len(), self.recipe.columns_of_efforts());
+            deformations = springs.groups(model, &prepared, behind)?;
+            springs.forget_links(&mut prepared.channels);
+        }
         let logs = std::slice::from_ref(&prepared);
         let rows = LogRows::new(model, &structure.shape, &structure.base.kept, logs, &choices, &conditioned)?;
         let rows = if self.recipe.has_delays() { rows.with_delay_columns()? } else { rows };
-        let (groups, efforts) = reduced(&rows, &self.recipe)?;
+        let (mut groups, efforts) = reduced(&rows, &self.recipe)?;
         drop(rows);
+        groups.extend(deformations);
         let rest = Rest { groups, efforts, trained: TrainedLog::of(&prepared) };
         self.finish(name, log, findings, &prepared, rest)
     }
 
     /// Checks a log, looks at it before anything is made of it, and prepares it.
     pub(super) fn examine(&self, log: Log) -> Result<Examined, Error> {
-        let Problem { robot, model, settings, .. } = &self.problem;
+        let Problem { model, settings, .. } = &self.problem;
         check_settings(&log.settings)?;
         let name = labels(std::iter::once((&log.settings, log.log.name()))).remove(0);
-        if let Some(joint) = log.not_logged(&robot.axes).into_iter().next() {
+        if let Some(joint) = log.not_logged(&self.robot().axes).into_iter().next() {
             return Err(ReductionError::NotLogged { log: log.log.name().to_owned(), joint }.into());
         }
+        let log = match &self.recipe.springs {
+            Some(springs) => springs.read_at_motors(log)?,
+            None => log,
+        };
         log::check_stated_temperatures(std::iter::once(&log.settings), model)?;
         let logs = [log];
         let findings = match &self.bench {
@@ -171,7 +193,7 @@ impl Reducer {
         rest: Rest,
     ) -> Result<ReducedLog, Error> {
         let Rest { groups, efforts, trained } = rest;
-        if groups.iter().all(|g| g.rows() == 0) {
+        if groups.iter().all(|g| g.rows() == 0 || g.output >= self.recipe.outputs.len()) {
             let (log, seconds) = (prepared.name.clone(), trained.duration_s);
             return Err(ReductionError::NoRows { log, seconds }.into());
         }

@@ -40,9 +40,11 @@ impl Reduction {
         let (mut problem, Solved { shapes, power }) = self.recipe.problem()?;
         problem.training = self.logs.iter().map(|log| training_log(&log.facts.name)).collect();
         problem.settings.files.robot.clone_from(&problem.robot.path);
-        let columns = problem.structure.base.len();
+        let (columns, outputs) = (problem.structure.base.len(), self.recipe.outputs.len());
         let of_log = |(k, log): (usize, &ReducedLog)| -> Vec<ReducedGroup> {
-            log.groups.iter().map(|g| ReducedGroup { log: k, ..without_delay(g, columns) }).collect()
+            // Deformations say nothing of the efforts.
+            let of_efforts = log.groups.iter().filter(|g| g.output < outputs);
+            of_efforts.map(|g| ReducedGroup { log: k, ..without_delay(g, columns) }).collect()
         };
         let of_logs: Vec<Vec<ReducedGroup>> = self.logs.iter().enumerate().map(of_log).collect();
         let groups: Vec<ReducedGroup> = of_logs.iter().flatten().cloned().collect();

@@ -31,10 +31,12 @@ const PARTS: usize = 4;
 const KEPT_VALUES: usize = 1 << 16;
 
 impl Reducer {
-    /// Whether logs of these settings can be reduced window by window: not those of a stated period, of mechanisms with loops or journals.
+    /// Whether logs of these settings can be reduced window by window: not those of a stated period, of mechanisms with loops or journals, or with encoders
+    /// on both sides of gears.
     pub fn in_windows(&self, settings: &LogSettings) -> bool {
         let model = &self.problem.model;
-        settings.period_s.is_none() && model.closed().is_none() && model.journals().is_none()
+        let whole = self.recipe.springs.is_some() || model.closed().is_some() || model.journals().is_some();
+        settings.period_s.is_none() && !whole
     }
 
     /// Reduces a log that comes in parts, in one pass and in memory that does not grow with it.

@@ -3,21 +3,16 @@
 use dynid_clearance::deformation::{DeformationRows, Rows, Settings, SumRows};
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::SignalError;
-use dynid_motion::difference::central;
-use dynid_motion::filter::{butterworth, forward_backward};
-use dynid_motion::mask::{self, dilate, near_reversal};
+use dynid_motion::mask::{dilate, near_reversal};
 use dynid_motion::shift::shift;
 use dynid_motion::signal::rms;
 use dynid_rows::conditioning::PreparedLog;
 
 use super::Spring;
+use super::deformed::{Deformed, Sieve, Smooth, rows_hz};
 use crate::Error;
 use crate::identification::Identification;
 
-/// Cut-off of all signals, Hz.
-const CUTOFF_HZ: f64 = 10.0;
-/// Rows kept per period of the cut-off.
-const PER_PERIOD: f64 = 5.0;
 /// Correlation of residuals that spreads bear, s.
 const CORRELATED_S: f64 = 0.4;
 /// Standard deviations of a prior that nobody stated are widened so: it decides only what the logs leave open.
@@ -31,8 +26,8 @@ struct Filtered {
     block: RegressorBlock,
     /// Per output: effort without what is known of it.
     effort: Vec<Vec<f64>>,
-    /// Per elastic joint: deformation, speed of the link, sign of the motor's speed, position of the link.
-    deformed: Vec<[Vec<f64>; 4]>,
+    /// Per elastic joint.
+    deformed: Vec<Deformed>,
     /// Per output: columns of friction.
     friction: Vec<Vec<usize>>,
     /// Per output and sample: 1 where the joint moves, 0 where it stands or reverses, since friction has any value there.
@@ -63,7 +58,6 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
     let logs = id.logs.iter().map(filtered).collect::<Result<Vec<_>, SignalError>>();
     let logs = logs.map_err(|e| Error::Conditioning(e.into()))?;
     let slowest = id.logs.iter().map(|l| l.rate_hz).fold(f64::INFINITY, f64::min);
-    let cutoff = cutoff(slowest);
     let total: usize = logs.iter().map(|l| l.samples).sum();
     if total == 0 {
         return Ok(None);
@@ -104,25 +98,25 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
             true => vec![0.0; total],
             false => column(spring.link, *c),
         };
-        let signal = |k: usize| joined(&|l: &Filtered| l.deformed[j][k].clone());
-        let mut nuisances = vec![signal(1), signal(2)];
+        let signal = |of: fn(&Deformed) -> &Vec<f64>| joined(&|l: &Filtered| of(&l.deformed[j]).clone());
+        let mut nuisances = vec![signal(|d| &d.speed), signal(|d| &d.towards)];
         for (k, log) in logs.iter().enumerate() {
             let before: usize = logs[..k].iter().map(|l| l.samples).sum();
             let mut zero = vec![0.0; total];
             zero[before..before + log.samples].fill(1.0);
             nuisances.push(zero);
         }
-        let q = signal(3);
+        let q = signal(|d| &d.position);
         joints.push(DeformationRows {
             load: columns.iter().map(load).collect(),
             nuisances,
             once_per_turn: vec![q.iter().map(|q| q.sin()).collect(), q.iter().map(|q| q.cos()).collect()],
-            deformation: signal(0),
+            deformation: signal(|d| &d.deformation),
         });
     }
     let width = |c: usize| if id.stated[c].is_some() { 1.0 } else { PRIOR };
     let prior = columns.iter().map(|c| (id.prior.values[*c], width(*c) * id.prior.std[*c])).collect();
-    let lag = (CORRELATED_S * PER_PERIOD * cutoff).ceil() as usize;
+    let lag = (CORRELATED_S * rows_hz(slowest)).ceil() as usize;
     let torque = |spring: &Spring| {
         let mut out = vec![0.0; total];
         for c in &spring.columns {
@@ -138,66 +132,44 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
     }))
 }
 
-fn cutoff(rate_hz: f64) -> f64 {
-    CUTOFF_HZ.min(0.1 * rate_hz)
-}
-
 fn filtered(
     model: &RobotModel,
     springs: &[Spring],
     log: &PreparedLog,
     lag_s: f64,
 ) -> Result<Filtered, SignalError> {
-    let (rate, n) = (log.rate_hz, log.samples());
-    let cutoff = cutoff(rate);
-    let filter = butterworth(4, cutoff, rate)?;
-    let margin = (2.0 * rate / cutoff).ceil() as usize;
-    let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
-    bad = dilate(&bad, margin);
-    mask::merge(&mut bad, &mask::edges(n, margin));
-    let thin = ((rate / (PER_PERIOD * cutoff)) as usize).max(1);
-    let kept: Vec<usize> = (0..n).step_by(thin).filter(|k| !bad[*k]).collect();
-    let pick = |signal: &[f64]| kept.iter().map(|k| signal[*k]).collect::<Vec<f64>>();
+    let rate = log.rate_hz;
+    let sieve = Sieve::new(log)?;
     let mut position = log.position.clone();
     for spring in springs {
         position[spring.link] = shift(&position[spring.link], lag_s * rate)?.values;
     }
-    let (mut q, mut dq, mut ddq) = (Vec::new(), Vec::new(), Vec::new());
-    let mut speeds = Vec::new();
-    for signal in &position {
-        let smooth = forward_backward(&filter, signal)?;
-        let speed = central(&smooth, rate)?;
-        q.extend(pick(&smooth));
-        dq.extend(pick(&speed));
-        ddq.extend(pick(&central(&speed, rate)?));
-        speeds.push(speed);
-    }
-    let sliding = |speed: &Vec<f64>| {
-        let reversing =
-            dilate(&near_reversal(speed, REVERSAL * rms(speed)), (ROUND_S * rate).ceil() as usize);
-        kept.iter().map(|k| if reversing[*k] { 0.0 } else { 1.0 }).collect()
+    let smooth =
+        position.iter().map(|signal| sieve.smooth(signal)).collect::<Result<Vec<_>, SignalError>>()?;
+    let all = |of: fn(&Smooth) -> &Vec<f64>| -> Vec<f64> {
+        smooth.iter().flat_map(|s| sieve.pick(of(s))).collect()
     };
-    let sliding: Vec<Vec<f64>> = speeds.iter().map(sliding).collect();
+    let (q, dq, ddq) = (all(|s| &s.position), all(|s| &s.speed), all(|s| &s.acceleration));
+    let sliding = |smooth: &Smooth| {
+        let reversing = dilate(
+            &near_reversal(&smooth.speed, REVERSAL * rms(&smooth.speed)),
+            (ROUND_S * rate).ceil() as usize,
+        );
+        sieve.kept.iter().map(|k| if reversing[*k] { 0.0 } else { 1.0 }).collect()
+    };
+    let sliding: Vec<Vec<f64>> = smooth.iter().map(sliding).collect();
     let deformed = springs
         .iter()
         .map(|spring| {
-            let pairs = position[spring.motor].iter().zip(&position[spring.link]);
-            let raw: Vec<f64> = pairs.map(|(motor, link)| motor / spring.ratio - link).collect();
-            let towards: Vec<f64> =
-                speeds[spring.motor].iter().map(|v| (v / spring.ratio).signum()).collect();
-            Ok([
-                pick(&forward_backward(&filter, &raw)?),
-                pick(&speeds[spring.link]),
-                pick(&forward_backward(&filter, &towards)?),
-                pick(&forward_backward(&filter, &position[spring.link])?),
-            ])
+            let motor = (position[spring.motor].as_slice(), &smooth[spring.motor], spring.ratio);
+            sieve.deformed(motor, (&position[spring.link], &smooth[spring.link]))
         })
         .collect::<Result<Vec<_>, SignalError>>()?;
-    let effort = log.effort.iter().map(|e| Ok(pick(&forward_backward(&filter, e)?)));
-    let mut effort = effort.collect::<Result<Vec<Vec<f64>>, SignalError>>()?;
-    let samples = kept.len();
+    let mut effort =
+        log.effort.iter().map(|e| sieve.filtered(e)).collect::<Result<Vec<Vec<f64>>, SignalError>>()?;
+    let samples = sieve.kept.len();
     let channels: Vec<(&str, Vec<f64>)> =
-        log.channels.iter().map(|c| (c.name.as_str(), pick(&c.values))).collect();
+        log.channels.iter().map(|c| (c.name.as_str(), sieve.pick(&c.values))).collect();
     let channels: Vec<(&str, &[f64])> = channels.iter().map(|(name, x)| (*name, x.as_slice())).collect();
     let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(samples, &q, &dq, &ddq) };
     let shape = model.parameters().shape_start();

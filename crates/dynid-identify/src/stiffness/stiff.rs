@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use dynid_logs::ColumnMapping;
 use dynid_logs::columns::ColumnUse;
-use dynid_motion::JointSignals;
+use dynid_motion::{Channel, JointSignals};
 use dynid_robots::{ElasticSpec, ElementSetting, SettingValue};
 
 use crate::Error;
@@ -86,16 +86,19 @@ pub(crate) fn stiff_settings(settings: &Settings, robot: &Robot) -> Settings {
     out
 }
 
+/// Ends the name of the channel that holds the position of a link.
+pub(crate) const BEHIND_GEAR: &str = " behind its gear";
+
 /// A log of an elastic robot for the same robot with stiff joints: positions and efforts are those of the motors, on the side of the
-/// joints.
+/// joints. `links`: positions of the links become channels, the names of their joints before [`BEHIND_GEAR`].
 ///
 /// # Errors
 /// [`Error::Log`].
-pub(crate) fn at_motors(log: Log, elastic: &[ElasticSpec]) -> Result<Log, Error> {
+pub(crate) fn at_motors(log: Log, elastic: &[ElasticSpec], links: bool) -> Result<Log, Error> {
     let name = log.log.name().to_owned();
     let mapping = log.source.mapping.as_ref().map(|mapping| mapping_at_motors(mapping, elastic));
     let columns = mapping.as_ref().map_or_else(|| log.source.columns.clone(), understood);
-    let mut log = log.map_signals(|signals| signals_at_motors(name, signals, elastic))?;
+    let mut log = log.map_signals(|signals| signals_at_motors(name, signals, elastic, links))?;
     (log.source.mapping, log.source.columns) = (mapping, columns);
     Ok(log)
 }
@@ -104,8 +107,9 @@ fn signals_at_motors(
     name: String,
     signals: dynid_motion::Log,
     elastic: &[ElasticSpec],
+    links: bool,
 ) -> Result<dynid_motion::Log, Error> {
-    let (time, joints, channels) = signals.into_parts();
+    let (time, joints, mut channels) = signals.into_parts();
     let of_motor = |joint: &str| elastic.iter().find(|spec| spec.joint == joint);
     let is_motor = |joint: &JointSignals| elastic.iter().any(|spec| spec.motor == joint.name);
     let scaled = |signal: &[f64], factor: f64| signal.iter().map(|x| x * factor).collect::<Vec<f64>>();
@@ -123,6 +127,11 @@ fn signals_at_motors(
         }
     });
     let kept = kept.collect();
+    let link = |spec: &ElasticSpec| {
+        let joint = joints.iter().find(|joint| joint.name == spec.joint)?;
+        Some(Channel { name: format!("{}{BEHIND_GEAR}", spec.joint), values: joint.position.clone() })
+    };
+    channels.extend(elastic.iter().filter(|_| links).filter_map(link));
     Ok(dynid_motion::Log::new(name, time, kept, channels)?)
 }
 

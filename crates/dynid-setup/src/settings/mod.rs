@@ -72,6 +72,10 @@ pub struct Settings {
     pub bound: Vec<BoundConfig>,
     /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
     pub preferred: Vec<String>,
+    /// Elastic joints without torque sensors are taken as stiff ones, read at their motors, even where rows of links and motors bear a stiffness
+    /// out; their stiffness is that of their deformation. A recipe for factors of logs needs it. Default false.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stiff_joints: bool,
     /// Bodies that some logs carry.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub payload: Vec<PayloadConfig>,

@@ -56,11 +56,11 @@ pub(super) fn fleet(
     let mut warnings = Vec::new();
     let covariates = covariates(&origins, settings, &mut warnings)?;
     let (varying, positive) = varying(recipe, settings)?;
-    let (columns, scales) = (recipe.all_columns(), recipe.choices.scales_hz.len());
+    let columns = recipe.all_columns();
     let undated = origins.iter().filter(|o| o.start_s.is_none()).count();
     let of_log = |(log, origin): (&ReducedLog, &Origin)| {
         let channel = |g: &dynid_factor::groups::ReducedGroup| ChannelFactor {
-            channel: g.output * scales + g.scale,
+            channel: recipe.channel(g),
             columns: g.columns.clone(),
             factor: Factor::merge(&g.blocks.iter().collect::<Vec<_>>()),
         };
@@ -79,12 +79,12 @@ pub(super) fn fleet(
     let of_fleet: Vec<FleetLog> = logs.iter().zip(&origins).map(of_log).collect();
     let every = logs.len().div_ceil(HALVED).max(1);
     let halved = (0..logs.len()).step_by(every).filter(|_| recipe.payload().is_some());
-    let halves = halved.filter_map(|log| halves(log, &logs[log], scales)).collect();
+    let halves = halved.filter_map(|log| halves(log, &logs[log], recipe)).collect();
     let facts: Vec<LogFacts> = logs.into_iter().map(|log| log.facts).collect();
     let key = |name: &String| u64::from_be_bytes(std::array::from_fn(|i| sha256_bytes(name.as_bytes())[i]));
     let fleet = Fleet {
         columns: columns.len(),
-        channels: recipe.outputs.len() * scales,
+        channels: recipe.channels().len(),
         robots: robots.iter().map(key).collect(),
         covariates: covariates.len(),
         varying,
@@ -118,20 +118,21 @@ pub(super) fn carried(fleet: &Fleet) -> Vec<usize> {
     (0..fleet.varying.len()).filter(|k| !fleet.varying[*k].watched).collect()
 }
 
-/// A log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
-fn halves(log: usize, reduced: &ReducedLog, scales: usize) -> Option<LogHalves> {
+/// The efforts of a log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
+fn halves(log: usize, reduced: &ReducedLog, recipe: &Recipe) -> Option<LogHalves> {
     let half = |second: bool| -> Option<Vec<ChannelFactor>> {
         let channel = |g: &dynid_factor::groups::ReducedGroup| {
             let (first, rest) = g.blocks.split_at(g.blocks.len() / 2);
             let own: Vec<&Factor> = if second { rest } else { first }.iter().collect();
             let rows: usize = own.iter().map(|f| f.rows()).sum();
             (rows > 0).then(|| ChannelFactor {
-                channel: g.output * scales + g.scale,
+                channel: recipe.channel(g),
                 columns: g.columns.clone(),
                 factor: Factor::merge(&own),
             })
         };
-        reduced.groups.iter().filter(|g| g.rows() > 0).map(channel).collect()
+        let of_efforts = |g: &&dynid_factor::groups::ReducedGroup| g.output < recipe.outputs.len();
+        reduced.groups.iter().filter(of_efforts).filter(|g| g.rows() > 0).map(channel).collect()
     };
     Some(LogHalves { log, halves: [half(false)?, half(true)?] })
 }

@@ -56,7 +56,7 @@ impl FleetResult {
             delays => factor.freed_of(delays),
         };
         pooled.blocks = said.into_iter().map(of_bodies).collect();
-        pooled.covariance = self.without_delays(fit.jackknife.as_ref().unwrap_or(&fit.covariance));
+        pooled.covariance = self.of_efforts(fit.jackknife.as_ref().unwrap_or(&fit.covariance));
         pooled.cautions.extend(file.warnings.iter().map(|w| Caution::warn(caution::FLEET, w, LOOK)));
         pooled.cautions.extend(carried(file));
         self.recipe.solve_pooled(pooled)
@@ -93,7 +93,7 @@ impl FleetResult {
         };
         let fitted = without.as_ref().unwrap_or(fitted);
         let p = self.recipe.columns.len();
-        let (values, covariance) = (&fitted.values[..p], self.without_delays(&fitted.covariance));
+        let (values, covariance) = (&fitted.values[..p], self.of_efforts(&fitted.covariance));
         let of_type_columns = of_type.base.values(of_type.values());
         let shared: Vec<usize> = self.fleet.shared().into_iter().filter(|c| *c < p).collect();
         let values = given_shared(values, &covariance, &shared, &of_type_columns);
@@ -144,14 +144,15 @@ impl FleetResult {
             return Ok(found);
         }
         let scales = self.recipe.choices.scales_hz.len();
-        let silent: Vec<bool> = (0..self.fleet.channels).map(|c| !explained[c / scales]).collect();
+        let silent: Vec<bool> =
+            (0..self.fleet.channels).map(|c| explained.get(c / scales) == Some(&false)).collect();
         let fit = Arc::new(self.fit.without(&self.fleet, &silent).map_err(|error| self.fault(error))?);
         known().insert(explained, Arc::clone(&fit));
         Ok(Some(fit))
     }
 
     /// A covariance of columns of the model alone.
-    fn without_delays(&self, covariance: &Mat) -> Mat {
+    fn of_efforts(&self, covariance: &Mat) -> Mat {
         let p = self.recipe.columns.len();
         Mat::from_fn(p, p, |i, j| covariance[(i, j)])
     }
@@ -170,7 +171,8 @@ impl FleetResult {
             let own = self.fit.values_of_log(&self.fleet, *k);
             let own = own.as_deref().unwrap_or(values);
             let mut of_log = vec![(0, 0.0); outputs];
-            for channel in &self.fleet.logs[*k].channels {
+            let of_efforts = |c: &&dynid_fleet::ChannelFactor| c.channel < outputs * scales;
+            for channel in self.fleet.logs[*k].channels.iter().filter(of_efforts) {
                 let x: Vec<f64> = channel.columns.iter().map(|c| own[*c]).collect();
                 let (rows, rss) = (channel.factor.rows(), channel.factor.rss(&x));
                 let all: &mut (usize, f64) = &mut left[channel.channel];

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use dynid_estimate::distribution::t_quantile;
 use dynid_fleet::drift::{History, Kind};
 use dynid_fleet::{FEW, LEAST_HALVED, LogDifference, Noise};
-use dynid_identify::reduction::DELAY;
+use dynid_identify::reduction::{BACKLASH, COMPLIANCE, DELAY, HYSTERESIS, LAG};
 use dynid_record::{Basis, Outcome, words};
 use serde::{Deserialize, Serialize};
 
 use super::failure::Failure;
-use super::{FleetResult, manifest};
+use super::{FleetResult, changes_of, manifest};
 use crate::estimate::{Provenance, SCHEMA};
 
 /// Noise in the directions of the motion beyond this many times what lies between them hints at a wrong model.
@@ -144,14 +144,15 @@ pub struct SlopeRecord {
     pub between_robots: Option<f64>,
 }
 
-/// Noise of an effort behind a kernel.
+/// Noise of an effort behind a kernel, or of the deformation of a joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ChannelRecord {
-    /// Joint or motor.
+    /// Joint or motor, or `deformation of` a joint with encoders on both sides of its gear.
     pub output: String,
-    /// Kernel, Hz.
-    pub kernel_hz: f64,
-    /// Median over the logs of the standard deviation of a row, in the unit of the effort.
+    /// Kernel, Hz; absent for deformations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernel_hz: Option<f64>,
+    /// Median over the logs of the standard deviation of a row, in the unit of the effort, rad (m) of deformations.
     pub sd: f64,
     /// Variance in the directions of the motion over that between them, 1 for white noise.
     pub colour: f64,
@@ -427,8 +428,7 @@ impl FleetResult {
     }
 
     fn noise(&self) -> Vec<ChannelRecord> {
-        let scales = &self.recipe.choices.scales_hz;
-        let noise = &self.fit.noise;
+        let (channels, noise) = (self.recipe.channels(), &self.fit.noise);
         let mut sds: Vec<Vec<f64>> = vec![Vec::new(); self.fleet.channels];
         for (log, variances) in self.fleet.logs.iter().zip(&noise.variances) {
             let told = log.channels.iter().zip(variances).filter(|(_, v)| **v < Noise::SILENT);
@@ -437,8 +437,8 @@ impl FleetResult {
         let of = |(channel, mut sds): (usize, Vec<f64>)| {
             sds.sort_by(f64::total_cmp);
             Some(ChannelRecord {
-                output: self.recipe.outputs[channel / scales.len()].name.clone(),
-                kernel_hz: scales[channel % scales.len()],
+                output: channels[channel].0.clone(),
+                kernel_hz: channels[channel].1,
                 sd: *sds.get(sds.len() / 2)?,
                 colour: noise.colours[channel],
             })
@@ -526,6 +526,10 @@ impl FleetResult {
             ),
             "fo" => "an offset: zero or brake, cable, current sensor".to_owned(),
             DELAY => "the delay of the effort: drive, bus, or what logs them".to_owned(),
+            COMPLIANCE | "k1" | "k2" => "the spring of the joint: crack or loose bolt of gear, belt or flange; or another load than before".to_owned(),
+            BACKLASH => "play of the gear: wear of its teeth, a loose coupling or key".to_owned(),
+            HYSTERESIS => "friction behind the spring or in the gear: bearing or seal of the link, preload".to_owned(),
+            LAG => "the record of the link: its encoder, bus, or what logs them; or viscous friction behind the spring".to_owned(),
             _ if self.built.covariates.is_empty() => {
                 "friction: wear or damage; or temperature, lubricant or load, none of which is stated"
                     .to_owned()
@@ -548,11 +552,12 @@ impl FleetResult {
 
     fn logs_to_look_at(&self) -> Vec<LogRecord> {
         let fit = &self.fit;
-        // Logs behind a change are told by the change.
-        let changed = |r: usize, k: usize| {
-            let history = self.drift.as_ref().map(|d| &d.robots[r].history);
-            matches!(history, Some(History::Changed { changes, .. }) if changes.iter().any(|c| c.coordinate == k))
-        };
+        // Logs behind a change are told by the change, and so are the other parameters of a deformation, of which it is a part.
+        let deformation = |k: usize| self.recipe.deformation_of(self.fleet.varying[k].column);
+        let together =
+            |a: usize, b: usize| a == b || deformation(a).is_some() && deformation(a) == deformation(b);
+        let changed =
+            |r: usize, k: usize| changes_of(self.drift.as_ref(), r).iter().any(|c| together(c.coordinate, k));
         let mut by_log: BTreeMap<usize, Vec<LogDeviation>> = BTreeMap::new();
         for o in &self.log_outliers {
             if !changed(self.fleet.logs[o.unit].robot, o.coordinate) {
@@ -645,11 +650,15 @@ impl FleetResult {
         }
         for channel in told.iter().filter(|c| c.colour > COLOURED) {
             out.push(format!(
-                "{} ({:.1} Hz): residuals hold {:.0} times as much of what the motion can explain as noise would: the model lacks something there",
-                channel.output, channel.kernel_hz, channel.colour
+                "{}{}: residuals hold {:.0} times as much of what the motion can explain as noise would: the model lacks something there",
+                channel.output,
+                channel.kernel_hz.map_or_else(String::new, |hz| format!(" ({hz:.1} Hz)")),
+                channel.colour
             ));
         }
-        if told.iter().any(|c| c.colour > COLOURED) && self.recipe.payload().is_none() {
+        if told.iter().any(|c| c.colour > COLOURED && c.kernel_hz.is_some())
+            && self.recipe.payload().is_none()
+        {
             out.push(
                 "robots that do not always carry the same need a recipe that lets logs differ in it: `dynid reduce --payload LINK`".to_owned(),
             );

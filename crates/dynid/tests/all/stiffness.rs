@@ -9,6 +9,7 @@ use dynid::check::{FindingId, Severity, check};
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::{Estimate, Split};
 use dynid::identify;
+use dynid::reduce::{OwnOfLogs, learn, reduce};
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::stiffness::{JointStiffness, StiffnessVerdict};
@@ -234,4 +235,81 @@ fn encoders_read_at_different_times_do_not_make_a_stiffness() {
         assert!(matches!(s.verdict, StiffnessVerdict::Told | StiffnessVerdict::Coarse), "{s:?}");
         assert!((s.lag_s.0 - 3e-3).abs() < 2e-4, "{s:?}");
     }
+}
+
+/// Factors of a log hold its deformations: compliance, the rest of the lag, and friction behind the spring as hysteresis.
+#[test]
+fn factors_of_a_log_tell_the_compliance_of_its_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("robot.toml"), ARM).unwrap();
+    let robot = Robot::parse(ARM, Path::new("robot.toml"), &RobotOptions::default()).unwrap();
+    for (name, late, seed) in [("taught.csv", 3, 1), ("other.csv", 5, 2)] {
+        let settings =
+            SimulateSettings { duration_s: 20.0, rate_hz: 1000.0, seed, ..SimulateSettings::default() };
+        std::fs::write(folder.path().join(name), table(&simulate(&robot, &settings).unwrap(), late)).unwrap();
+    }
+    let entry = |name: &str| LogConfig { path: folder.path().join(name), ..LogConfig::default() };
+    let config = Config {
+        robot: folder.path().join("robot.toml"),
+        log: vec![entry("taught.csv")],
+        ..Config::default()
+    };
+    let learned = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap();
+    let recipe = learned.reduction.recipe().clone();
+    // Motors and links are still what logs have columns for.
+    assert_eq!(
+        dynid::log::names(&recipe.clone().reducer().unwrap().robot().axes),
+        ["j1", "j2", "j1_motor", "m2"]
+    );
+    let made = reduce(recipe.clone(), &[entry("other.csv")], &Default::default(), None, &mut |_| {}).unwrap();
+    let (outputs, columns) = (recipe.outputs.len(), recipe.all_columns());
+    let deformations: Vec<_> = made.logs()[0].groups.iter().filter(|g| g.output >= outputs).collect();
+    assert_eq!(deformations.len(), 2);
+    for (group, (joint, k, friction)) in deformations.iter().zip([("j1", 4e4, 1.0), ("j2", 2e4, 0.5)]) {
+        let found = group.blocks[0].solve();
+        let of = |symbol: &str| {
+            let name = format!("{joint}.{symbol}");
+            group.columns.iter().position(|c| columns[*c].name == name).map(|at| found[at])
+        };
+        println!("{joint}: {found:?}");
+        let compliance = of("compliance").unwrap();
+        assert!((compliance * k - 1.0).abs() < 0.01, "{joint}: {compliance:e}");
+        // Two samples more than the log that taught.
+        assert!((of("lag").unwrap() - 2e-3).abs() < 5e-5, "{joint}: {found:?}");
+        assert!((of("hysteresis").unwrap() * k / friction - 1.0).abs() < 0.15, "{joint}: {found:?}");
+        assert!(of("backlash").is_none_or(|b| b.abs() < 5e-6), "{joint}: {found:?}");
+    }
+    // The efforts are solved without them.
+    let solved = made.solve([], &mut |_| {}).unwrap().estimate();
+    assert_eq!(solved.joints, ["j1", "j2"]);
+    let asked = Config { stiff_joints: true, ..config };
+    let direct = identify(&asked, &mut |_| {}).unwrap();
+    assert_eq!(direct.estimate().joints, ["j1", "j2"]);
+}
+
+/// Torque sensors behind springs: stiffness is a parameter of the factors, which give the parameters of the identification.
+#[test]
+fn factors_hold_the_stiffness_that_torque_sensors_tell() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/hit-joint.toml");
+    let robot = Robot::load(&path, &RobotOptions::default()).unwrap();
+    let settings = SimulateSettings { duration_s: 60.0, rate_hz: 100.0, ..SimulateSettings::default() };
+    let log = simulate(&robot, &settings).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "t,q_joint,q_joint_motor,tau_joint,tau_joint_motor\n".to_owned();
+    for k in 0..log.time.len() {
+        let cells = [log.time[k], log.position[0][k], log.position[1][k], log.effort[0][k], log.effort[1][k]];
+        writeln!(text, "{}", cells.map(|x| x.to_string()).join(",")).unwrap();
+    }
+    let file = folder.path().join("log.csv");
+    std::fs::write(&file, text).unwrap();
+    let entry = LogConfig { path: file, ..LogConfig::default() };
+    let config = Config { robot: path, log: vec![entry], ..Config::default() };
+    let learned = learn(&config, &OwnOfLogs::default(), &mut |_| {}).unwrap();
+    assert!(learned.reduction.recipe().springs.is_none());
+    let solved = learned.reduction.solve([], &mut |_| {}).unwrap().estimate();
+    for (a, b) in solved.base_parameters.iter().zip(&learned.estimate.base_parameters) {
+        let (x, y, std) = (a.value.unwrap(), b.value.unwrap(), b.std.unwrap());
+        assert!(a.name == b.name && (x - y).abs() < 1e-8 * std, "{} {x:e} {y:e}", a.name);
+    }
+    assert!(solved.base_parameters.iter().any(|p| p.name == "joint.k1"));
 }

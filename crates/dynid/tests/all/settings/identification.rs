@@ -795,6 +795,7 @@ fn cases() -> Vec<Case> {
         table("bound.parameter", "[[bound]]\nparameter = \"j9.fc\"\nrange = [0, 1]", Refused("j9.fc")),
         table("bound.range", "[[bound]]\nparameter = \"j1.fc\"\nrange = [5, 6]", Changes),
         top("preferred", "preferred = [\"link1.m\", \"link2.m\"]", Changes),
+        top("stiff_joints", "stiff_joints = true", Refused("elastic joints without torque sensors")),
         top("trajectory", "trajectory = \"none.json\"", Refused("none.json")),
         top("period_s", "period_s = 3.0", Changes),
         table("payload.name", TOOL, Refused("payload")),

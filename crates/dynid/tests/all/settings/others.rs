@@ -104,6 +104,8 @@ fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
         beside("fleet.wear", "[fleet]", "[fleet]\nwear = 99", Refused("as many robots")),
         beside("fleet.faults", "[fleet]", "[fleet]\nfaults = 1", Changes),
         beside("fleet.delays", "[fleet]", "[fleet]\ndelays = 1", Changes),
+        beside("fleet.stiffness", "[fleet]", "[fleet]\nstiffness = 1", Refused("no joint is `elastic`")),
+        beside("fleet.backlash", "[fleet]", "[fleet]\nbacklash = 1", Refused("without torque sensor")),
         beside("fleet.payload", "[fleet]", "[fleet]\npayload = 2", Changes),
         beside("fleet.payload", "[fleet]", "[fleet]\npayload = -2", Refused("makes sense")),
         beside("fleet.broken", "[fleet]", "[fleet]\nbroken = 0.3", Changes),
