@@ -24,7 +24,7 @@ const NO_SPREAD: f64 = 1e-4;
 pub struct VarianceSettings {
     /// Degrees of freedom of Student's t, coordinate by coordinate; `None`: normal deviations, weights as they are.
     pub freedom: Option<f64>,
-    /// Largest change of the logarithm of a variance at the end.
+    /// Largest change of the logarithm of a variance at the end; of one below the smallest estimation variance times its share of that.
     pub tolerance: f64,
     /// Most sweeps of the fleet.
     pub passes: usize,
@@ -203,7 +203,8 @@ pub(crate) fn maximise(
         let (m2l, (robots, logs)) = (sweep.m2l, sweep.information());
         none_where_unseen(&mut next.robots, &robots);
         none_where_unseen(&mut next.logs, &logs);
-        change = largest_change(&now, &next);
+        change = largest_change((&now.robots, &next.robots), &robots)
+            .max(largest_change((&now.logs, &next.logs), &logs));
         run.push(now);
         if settings.accelerated && run.len() == 2 && change > settings.tolerance {
             let far = extrapolated(&run[0], &run[1], &next);
@@ -228,9 +229,14 @@ fn none_where_unseen(variances: &mut [f64], information: &[f64]) {
     }
 }
 
-fn largest_change(before: &Variances, after: &Variances) -> f64 {
-    let change = |(a, b): (f64, f64)| if a > 0.0 && b > 0.0 { (b / a).ln().abs() } else { 0.0 };
-    before.joined().into_iter().zip(after.joined()).map(change).fold(0.0, f64::max)
+/// Largest change of the logarithm of a variance, each as far as it decides something: one that is small beside all estimation variances goes to zero
+/// without end, and changes no deviation on its way.
+fn largest_change((before, after): (&[f64], &[f64]), information: &[f64]) -> f64 {
+    let change = |((a, b), information): ((&f64, &f64), &f64)| match *a > 0.0 && *b > 0.0 {
+        true => (b / a).ln().abs() * (a.max(*b) * information).min(1.0),
+        false => 0.0,
+    };
+    before.iter().zip(after).zip(information).map(change).fold(0.0, f64::max)
 }
 
 /// One step of squared extrapolation in the logarithms, with the weights of the last point.
