@@ -12,7 +12,7 @@ use crate::noise::median;
 use crate::outliers::largest_discovery;
 use crate::sweep::Sweep;
 use history::Logs;
-use pattern::{AS_GOOD, of_background};
+use pattern::{AS_GOOD, ONSET_STEP, mean_onset, of_background};
 use series::Background;
 
 pub use pattern::{Candidate, Pattern, candidates, patterns, probability};
@@ -338,19 +338,24 @@ impl Tests<'_> {
         }
         let mut changes = Vec::new();
         while changes.len() < settings.most_changes && self.p(best.evidence) <= threshold {
-            changes.push(self.change(fleet, &best));
-            self.found.push((best.coordinate, best.candidate.pattern.values(&best.series.times)));
+            let (change, pattern) = self.change(fleet, &best);
+            changes.push(change);
+            self.found.push((best.coordinate, pattern.values(&best.series.times)));
             best = self.best(best.weights);
         }
         RobotHistory { history: History::Changed { p, changes }, detectable, statistics, logs }
     }
 
-    /// A change told from its candidates.
-    fn change(&self, fleet: &Fleet, found: &Best) -> Change {
+    /// A change told from its candidates, and its pattern: a ramp begins at the mean of the onsets by their likelihood, since the likeliest one
+    /// scatters more (and lies at either end where little is told).
+    fn change(&self, fleet: &Fleet, found: &Best) -> (Change, Pattern) {
         let Best { series, coordinate: k, candidate: best, evidence, .. } = found;
-        let (k, best) = (*k, *best);
+        let (k, mut best) = (*k, *best);
         let background = Background::new(series, self.precision, self.found.clone());
         let all = of_background(&background, series, k, &patterns(series));
+        if let Some(onset) = mean_onset(&all).filter(|_| !best.pattern.is_step()) {
+            best = of_background(&background, series, k, &[Pattern::Ramp { onset }])[0];
+        }
         let largest = |step: bool| {
             let of = all.iter().filter(|c| c.pattern.is_step() == step).map(|c| c.statistic);
             of.fold(0.0, f64::max)
@@ -364,12 +369,14 @@ impl Tests<'_> {
         };
         let times = &series.times;
         // Either kind names dates of both.
+        let largest = if step { steps } else { ramps };
         let as_good = |c: &&Candidate| {
-            c.statistic > best.statistic - AS_GOOD && (kind == Kind::Either || c.pattern.is_step() == step)
+            c.statistic > largest - AS_GOOD && (kind == Kind::Either || c.pattern.is_step() == step)
         };
         let interval = |pattern: Pattern| match pattern {
             Pattern::Step { first } => (times[first - 1], times[first]),
-            Pattern::Ramp { onset } => (onset, onset),
+            // Between two onsets that were tried nothing is known.
+            Pattern::Ramp { onset } => ((onset - 0.5 * ONSET_STEP).max(0.0), onset + 0.5 * ONSET_STEP),
         };
         let spans: Vec<(f64, f64)> = all.iter().filter(as_good).map(|c| interval(c.pattern)).collect();
         let on_axis = |t: f64| self.logs.first_s + self.logs.span_s * t;
@@ -382,7 +389,7 @@ impl Tests<'_> {
             let told = same.then(|| of_background(&background, series, *other, &[best.pattern]));
             told.is_some_and(|told| told[0].statistic > 4.0 && told[0].size * best.size > 0.0)
         };
-        Change {
+        let change = Change {
             coordinate: k,
             kind,
             step,
@@ -394,7 +401,8 @@ impl Tests<'_> {
             from_s: on_axis(spans.iter().map(|s| s.0).fold(time, f64::min)),
             to_s: on_axis(spans.iter().map(|s| s.1).fold(time, f64::max)),
             together: (0..self.logs.coordinates()).filter(alike).count(),
-        }
+        };
+        (change, best.pattern)
     }
 }
 

@@ -9,6 +9,8 @@ use super::series::Series;
 const ONSETS: usize = 35;
 /// ... the last of them at this share of the span.
 const LAST_ONSET: f64 = 0.85;
+/// Distance of two of them.
+pub(crate) const ONSET_STEP: f64 = LAST_ONSET / (ONSETS - 1) as f64;
 /// Patterns whose statistic is less than this below the best are as good.
 pub(crate) const AS_GOOD: f64 = 5.0;
 
@@ -85,6 +87,20 @@ pub(crate) fn of_background(
         Candidate { pattern: *pattern, size: y / h, sd: h.sqrt().recip(), statistic: y * y / h }
     })
     .collect()
+}
+
+/// Mean of the onsets of ramps by their likelihood `exp(T/2)`, the statistic `T` being twice its logarithm; `None` without ramps that tell something.
+pub(crate) fn mean_onset(candidates: &[Candidate]) -> Option<f64> {
+    let ramps = candidates.iter().filter_map(|c| match c.pattern {
+        Pattern::Ramp { onset } => Some((onset, c.statistic)),
+        Pattern::Step { .. } => None,
+    });
+    let most = ramps.clone().map(|(_, t)| t).fold(0.0, f64::max);
+    let (sum, weight) = ramps.fold((0.0, 0.0), |(sum, weight), (onset, t)| {
+        let own = (0.5 * (t - most)).exp();
+        (sum + own * onset, weight + own)
+    });
+    (most > 0.0).then(|| sum / weight)
 }
 
 /// Probability that the largest statistic over all patterns of one coordinate exceeds `statistic` where nothing changes.
