@@ -6,6 +6,12 @@ use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::History;
 
+/// Samples from which on elements run on threads of their own: a simulation asks for one at a time, which takes less than waking a thread.
+const BESIDE: usize = 1024;
+
+/// An element, its shape parameters, what it remembers, and the rows of its signals.
+type Remembering<'a> = (&'a PlacedElement, &'a [f64], &'a mut Vec<f64>, Vec<&'a mut [f64]>);
+
 impl TreeModel {
     /// Names of the signals of all elements, those of known elements last.
     pub(super) fn signal_names(&self) -> Vec<String> {
@@ -38,15 +44,18 @@ impl TreeModel {
         let remembering =
             own.chain(known).zip(&mut history.states).filter(|((placed, _), _)| placed.signals > 0);
         let each = remembering.map(|((placed, shape), state)| {
-            let PlacedElement { element, signals, .. } = placed;
-            let rows: Vec<&mut [f64]> = rows.by_ref().take(*signals).collect();
-            assert_eq!(rows.len(), *signals, "room for signals");
-            (element, shape, state, rows)
+            let rows: Vec<&mut [f64]> = rows.by_ref().take(placed.signals).collect();
+            assert_eq!(rows.len(), placed.signals, "room for signals");
+            (placed, shape, state, rows)
         });
-        let each: Vec<_> = each.collect();
-        // Sample after sample, each waits for the one before: elements run beside each other.
-        each.into_par_iter().for_each(|(element, shape, state, mut rows)| {
-            element.remember(&self.joints, motion, step_s, shape, state, &mut rows);
-        });
+        let remember = |(placed, shape, state, mut rows): Remembering<'_>| {
+            placed.element.remember(&self.joints, motion, step_s, shape, state, &mut rows);
+        };
+        if motion.samples < BESIDE {
+            each.for_each(remember);
+        } else {
+            // Sample after sample, each waits for the one before: elements run beside each other.
+            each.collect::<Vec<_>>().into_par_iter().for_each(remember);
+        }
     }
 }
