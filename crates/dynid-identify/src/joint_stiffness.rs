@@ -1,6 +1,7 @@
 //! What the deformation of an elastic joint tells of its stiffness.
 
 use dynid_clearance::deformation::Verdict;
+use dynid_robots::ElasticSpec;
 use serde::{Deserialize, Serialize};
 
 /// What the deformation tells.
@@ -93,6 +94,15 @@ impl JointStiffness {
         };
         format!("`{}`: {told}, link record late by {:.2} ms", self.joint, 1e3 * self.lag_s.0)
     }
+}
+
+/// An elastic joint that was taken as a stiff one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StiffJoint {
+    /// The joint as its robot file has it.
+    pub spec: ElasticSpec,
+    /// Parameters whose efforts load it: those of its link's row but friction and the spring.
+    pub loads: Vec<String>,
 }
 
 /// What helps where a log tells little of a spring.

@@ -11,13 +11,12 @@ mod stiff;
 
 use dynid_clearance::deformation::{Deformation, Evidence, fit, judge};
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
-use dynid_robots::ElasticSpec;
 use dynid_rows::conditioning::PreparedLog;
 
 use crate::Error;
 use crate::elements::ElementPlan;
 use crate::identification::Identification;
-pub use crate::joint_stiffness::{JointStiffness, StiffnessVerdict};
+pub use crate::joint_stiffness::{JointStiffness, StiffJoint, StiffnessVerdict};
 pub(crate) use deformed::{Deformed, Sieve, Smooth};
 use rows::{LogRows, rows};
 pub(crate) use stiff::{BEHIND_GEAR, at_motors, stiff_robot, stiff_settings};
@@ -75,15 +74,6 @@ pub(crate) fn of(id: &Identification) -> Result<Vec<JointStiffness>, Error> {
     let Some((all, found, here)) = last else { return Ok(Vec::new()) };
     let one = |(j, spring)| told(id, spring, j, (&all, &found), here);
     Ok(springs.iter().enumerate().map(one).collect())
-}
-
-/// An elastic joint that was taken as a stiff one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StiffJoint {
-    /// The joint as its robot file has it.
-    pub spec: ElasticSpec,
-    /// Parameters whose efforts load it: those of its link's row but friction and the spring.
-    pub loads: Vec<String>,
 }
 
 /// Elastic joints of an identification, for them to be taken as stiff ones.

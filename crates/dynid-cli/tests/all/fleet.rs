@@ -270,45 +270,13 @@ fn delays_that_change_are_found() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("learn it with `--delays`"));
 }
 
-/// Two links, each with encoders on both sides of its gear.
-const SPRINGS: &str = r#"
-schema = 1
-name = "elastic-arm"
-gravity = [0, -9.81, 0]
-dh = "modified"
-[[joint]]
-name = "j1"
-limits = { position = ["-150deg", "150deg"], velocity = 2.0, effort = 200.0 }
-phi = [8.0, 2.0, 0.1, 0, 0.15, 0, 0, 0.85, 0, 0.9]
-[[joint]]
-name = "j2"
-a = 0.5
-limits = { position = ["-150deg", "150deg"], velocity = 2.5, effort = 80.0 }
-phi = [4.0, 0.8, -0.05, 0, 0.05, 0, 0, 0.28, 0, 0.3]
-[element.j1]
-elements = []
-elastic = { ratio = 100, k1 = 40000.0, cubic = false }
-[element.j1_motor]
-elements = ["coulomb", "viscous", "rotor"]
-coulomb = { effort = 0.08 }
-viscous = { coefficient = 4e-4 }
-rotor = { inertia = 1.2e-4 }
-[element.j2]
-elements = []
-elastic = { ratio = -80, motor = "m2", k1 = 20000.0, cubic = false }
-[element.m2]
-elements = ["coulomb", "viscous", "rotor"]
-coulomb = { effort = 0.04 }
-viscous = { coefficient = 2e-4 }
-rotor = { inertia = 6e-5 }
-"#;
-
 /// Encoders on both sides of gears tell which spring has softened and which gear has play, when, and by how much.
 #[test]
 fn springs_that_soften_and_gears_that_wear_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    std::fs::write(at.join("arm.toml"), SPRINGS).unwrap();
+    let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bench/fleets/elastic-arm.toml");
+    std::fs::copy(arm, at.join("arm.toml")).unwrap();
     let settings = "duration_s = 8\nrate_hz = 100\n[fleet]\nrobots = 12\nlogs = 12\nstiffness = 2\nbacklash = 2\n\
                     between_robots = { fc = 0.2, fv = 0.25, k1 = 0.05 }\nbetween_logs = { fc = 0.04, fv = 0.06, k1 = 0.005 }\n";
     std::fs::write(at.join("fleet.toml"), settings).unwrap();

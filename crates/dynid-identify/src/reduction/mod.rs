@@ -23,6 +23,7 @@
 //! What is not known without samples is left out: figures on single samples, whiteness of the residuals, the scale of the efforts by the
 //! robot file. Figures of a fit are those of its rows.
 
+mod columns;
 mod file;
 mod pooled;
 mod recipe;
@@ -46,9 +47,10 @@ use crate::log::Log;
 
 pub use crate::reduction_error::{FactorFileFault, ReductionError};
 pub use crate::trained_log::{RowFit, TrainedLog};
+pub use columns::{Column, Output};
 pub use file::VERSION;
 pub use pooled::Pooled;
-pub use recipe::{Blocks, Choices, Column, DELAY, Output, Recipe, check_payload_link, payload_columns};
+pub use recipe::{Blocks, Choices, DELAY, Recipe, check_payload_link, payload_columns};
 pub use reduce::{Reducer, WindowSettings};
 pub use springs::{BACKLASH, COMPLIANCE, HYSTERESIS, LAG, Spring, Springs};
 

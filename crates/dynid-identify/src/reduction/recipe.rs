@@ -11,6 +11,7 @@ use dynid_motion::cutoff::KernelLimit;
 use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
 use serde::{Deserialize, Serialize};
 
+use super::columns::{Column, Output};
 use super::shapes::Shapes;
 use super::springs::Springs;
 use super::{ReductionError, plain};
@@ -91,26 +92,6 @@ struct JointLimit {
     joint: String,
     velocity: Option<f64>,
     effort: Option<f64>,
-}
-
-/// An effort.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Output {
-    /// Joint or motor.
-    pub name: String,
-    /// `N m` or `N`.
-    pub unit: String,
-}
-
-/// A column of the factors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Column {
-    /// Base parameter, by the standard parameter that stands for it.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Size of the parameter: standard deviation that its prior leaves, in its unit.
-    pub scale: f64,
 }
 
 /// Choices of the conditioning.

@@ -21,7 +21,7 @@ use dynid_robots::ElasticSpec;
 use dynid_rows::conditioning::{ConditioningError, PreparedLog};
 use serde::{Deserialize, Serialize};
 
-use super::{Column, Output};
+use super::columns::{Column, Output};
 use crate::Error;
 use crate::estimate::ElasticRecord;
 use crate::identification::Identification;
