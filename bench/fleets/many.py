@@ -15,7 +15,6 @@ import gzip
 import json
 import os
 import random
-import re
 import shutil
 import signal
 import subprocess
@@ -115,7 +114,7 @@ def main():
         made = sorted(file for file in (folder / "factors").rglob("*.factors") if file.name != "recipe.factors")
         for file in rng.sample(made, len(made) // 10):
             file.unlink()
-    told = run("reduce", "type.factors", "--manifest", "made/manifest.csv", "--out", "factors")
+    told = json.loads(run("reduce", "type.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--json"))
     print(f"{len(rows)} logs, {kills} processes killed in {rounds} rounds, {time.monotonic() - started:.0f} s")
     started = time.monotonic()
     run("reduce", "type.factors", "--manifest", "made/sound.csv", "--out", "undisturbed")
@@ -126,13 +125,13 @@ def main():
 
     disturbed, undisturbed = of("factors", ".factors"), of("undisturbed", ".factors")
     same = disturbed.keys() == undisturbed.keys() and all(filecmp.cmp(disturbed[k], undisturbed[k], shallow=False) for k in disturbed)
-    failed = re.findall(r"^  (\S+) \(r\d+\): (\w+): ", told, re.MULTILINE)
-    named = sorted(Path(log).name for log, _ in failed)
+    failed = told["failures"]
+    named = sorted(Path(failure["log"]).name for failure in failed)
     expected = sorted(Path(rows[k].split(",")[0]).name for k in broken)
     stray = [file for file in (folder / "factors").rglob("*") if file.is_file() and not file.name.endswith((".factors", ".failed.json"))]
     print(f"files of factors {len(disturbed)} and {len(undisturbed)}: {'the same bytes' if same else 'NOT THE SAME'}; {len(stray)} stray files")
     print(f"broken {len(expected)}, named {len(named)}: {'the same logs' if named == expected else 'NOT THE SAME'}")
-    codes = {code: sum(own == code for _, own in failed) for code in sorted({code for _, code in failed})}
+    codes = {code: sum(f["code"] == code for f in failed) for code in sorted({f["code"] for f in failed})}
     print("codes: " + ", ".join(f"{code} {count}" for code, count in codes.items()))
     results = []
     for name in ["factors", "undisturbed"]:

@@ -1,7 +1,7 @@
 //! From chosen friction and shape parameters to the linear model that is fitted.
 
 use dynid_model::{EffortModel, Output};
-use dynid_rows::conditioning::{Conditioning, JointFriction};
+use dynid_rows::conditioning::{Conditioning, DelayEstimate, JointFriction, delay_again};
 
 use super::{Step, friction};
 use crate::Error;
@@ -9,6 +9,12 @@ use crate::elements::shape_element;
 use crate::problem::Problem;
 use crate::settings::Friction;
 use crate::shape::{self, ShapeFit, Start};
+
+/// Delays closer than this, samples, are the same, whatever their standard deviation.
+const SAME_DELAY: f64 = 0.05;
+
+/// `χ²` per degree of freedom from which on joints disagree about the delay.
+const DISAGREE: f64 = 2.0;
 
 /// What was found on the way to a linear model.
 pub(super) struct Shaped {
@@ -63,6 +69,7 @@ pub(super) fn search(
         *choices = chosen.conditioning;
         start = of_chosen(problem, &out.friction);
     }
+    let mut delay_is_of_chosen = choose;
     while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
         let found = shape::find(problem, choices, &start)?;
@@ -74,9 +81,38 @@ pub(super) fn search(
         let free = found.free();
         problem.model = shape::linearised(&problem.plan, &found.model, &found.linear, &free)?;
         problem.restructure()?;
+        if std::mem::take(&mut delay_is_of_chosen)
+            && let Some(delay) = other_delay(problem, choices, &out.friction)?
+        {
+            choices.delay = delay;
+            problem.rebuild()?;
+            let values = found.model.parameters().shape_start();
+            start = Start::Beside(values, found.findings.into_iter().map(Some).collect());
+            continue;
+        }
         out.found = Some(found);
     }
     Ok(out)
+}
+
+/// The delay by a model that is linear about its shape parameters, where it is another than that of the choices.
+///
+/// Friction that gives way turns over late, as by a delay; travels were those of a grid when the delay was found. Joints that disagree about it, or a
+/// single one, may owe it to them.
+fn other_delay(
+    problem: &Problem,
+    choices: &Conditioning,
+    friction: &[JointFriction],
+) -> Result<Option<DelayEstimate>, Error> {
+    let disagree = choices.delay.chi_squared.is_none_or(|chi| chi > DISAGREE);
+    if !disagree || !friction.iter().any(JointFriction::has_spring) {
+        return Ok(None);
+    }
+    let Problem { model, structure, logs, .. } = problem;
+    let (shape, settings) = (model.parameters().shape_start(), problem.conditioning_settings());
+    let again = delay_again(model, &shape, &structure.base.kept, logs, choices, &settings)?;
+    let moved = (again.samples - choices.delay.samples).abs();
+    Ok((moved > SAME_DELAY.max(again.half_width / 1.96)).then_some(again))
 }
 
 /// Where a search starts after shapes were chosen.

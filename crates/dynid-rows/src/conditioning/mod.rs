@@ -6,6 +6,7 @@
 
 mod base_prior;
 mod choose;
+mod delay_again;
 mod friction;
 mod friction_shape;
 mod gram;
@@ -30,6 +31,7 @@ mod windows;
 
 pub use base_prior::BasePrior;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
+pub use delay_again::delay_again;
 pub use dynid_factor::groups::ReducedGroup;
 pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
 pub use friction_shape::{FrictionShape, ShapeKind};

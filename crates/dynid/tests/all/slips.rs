@@ -51,6 +51,21 @@ fn config(folder: &Path, more: &str) -> Config {
     Config::read(&path).unwrap()
 }
 
+/// How late friction turns over is a travel, not a delay: joints agree about the delay once their travels are found, which grids of them do not tell.
+#[test]
+fn joints_with_springs_agree_about_the_delay() {
+    let folder = tempfile::tempdir().unwrap();
+    log(folder.path(), "log.csv", 20, 20);
+    let path = folder.path().join("run.toml");
+    std::fs::write(&path, "robot = \"arm.toml\"\n[[log]]\npath = \"log.csv\"\n").unwrap();
+    let found = identify(&Config::read(&path).unwrap(), &mut |_| {}).unwrap();
+    let delay = &found.conditioning.as_ref().unwrap().delay;
+    println!("{delay:?}");
+    // The log leads by 0.3 samples.
+    assert!(delay.chi_squared.unwrap() < 3.0 && (delay.samples - 0.3).abs() < 0.45, "{delay:?}");
+    assert!(found.friction.iter().all(|joint| joint.has_spring()));
+}
+
 #[test]
 fn springs_in_friction_are_found_and_predict_another_motion() {
     let folder = tempfile::tempdir().unwrap();
