@@ -330,12 +330,29 @@ fn springs_that_soften_and_gears_that_wear_are_found() {
     let of_type = read(&at.join("whole/type.json"));
     assert!(parameters(&of_type).all(|(name, _)| !name.ends_with(".compliance") && !name.ends_with(".k1")));
     run(at, &["export", "whole/type.json", "--urdf", "type.urdf", "--quiet"], 0);
-    // A log without its links is a failure by itself.
+    // Delays and payloads go together with deformations.
+    let own = ["reduce", "arm.toml", "--delays", "--payload", "link2", "--out", "own.factors", "--quiet"];
+    run(at, &[&own[..], &logs[..]].concat(), 0);
+    run(at, &["reduce", "own.factors", "--manifest", "made/manifest.csv", "--out", "own", "--quiet"], 0);
+    run(at, &["fleet", "own", "--out", "own-fleet", "--quiet"], 0);
+    assert_eq!(read(&at.join("own-fleet/fleet.json"))["payload"]["link"], "link2");
+    // An encoder that stands is told; a log without its links is a failure by itself.
     let log = std::fs::read(at.join("made/logs/r003-001.csv.gz")).unwrap();
     let mut text = String::new();
     std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(&log[..]), &mut text).unwrap();
+    let mut rows = text.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let (head, first) = (rows.next().unwrap(), rows.next().unwrap());
+    let dead = head.iter().position(|name| *name == "q_j2").unwrap();
+    let mut stands = format!("{}\n{}\n", head.join(","), first.join(","));
+    for mut row in rows {
+        row[dead] = first[dead];
+        stands += &(row.join(",") + "\n");
+    }
+    std::fs::write(at.join("stands.csv"), stands).unwrap();
+    let output = run(at, &["reduce", "type.factors", "--log", "stands.csv", "--out", "x.factors"], 0);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("link of `j2` stands"), "{output:?}");
     std::fs::write(at.join("motors.csv"), text.replacen("q_j2", "unknown", 1)).unwrap();
-    let output = run(at, &["reduce", "type.factors", "--log", "motors.csv", "--out", "x.factors"], 2);
+    let output = run(at, &["reduce", "type.factors", "--log", "motors.csv", "--out", "y.factors"], 2);
     assert!(String::from_utf8_lossy(&output.stderr).contains("j2"), "{output:?}");
 }
 

@@ -130,10 +130,13 @@ impl Reducer {
     pub(super) fn reduce_whole(&self, log: Log) -> Result<ReducedLog, Error> {
         let Examined { name, log, findings, mut prepared, conditioned, choices } = self.examine(log)?;
         let Problem { model, structure, .. } = &self.problem;
-        let mut deformations = Vec::new();
+        let (mut deformations, mut dead) = (Vec::new(), Vec::new());
         if let Some(springs) = &self.recipe.springs {
             let behind = (self.recipe.outputs.len(), self.recipe.columns_of_efforts());
-            deformations = springs.groups(model, &prepared, behind)?;
+            // Of logs that may differ in what they carry halves are compared.
+            let blocks = if self.recipe.payload().is_some() { 2 } else { 1 };
+            deformations = springs.groups(model, &prepared, behind, blocks)?;
+            dead = springs.dead(model, &prepared);
             springs.forget_links(&mut prepared.channels);
         }
         let logs = std::slice::from_ref(&prepared);
@@ -143,7 +146,15 @@ impl Reducer {
         drop(rows);
         groups.extend(deformations);
         let rest = Rest { groups, efforts, trained: TrainedLog::of(&prepared) };
-        self.finish(name, log, findings, &prepared, rest)
+        let mut reduced = self.finish(name, log, findings, &prepared, rest)?;
+        reduced.facts.cautions.extend(dead.into_iter().map(|joint| {
+            let message = format!(
+                "{}: the record of the link of `{joint}` stands while its motor moves: it tells no deformation",
+                reduced.facts.name
+            );
+            Caution::warn(caution::LOG, message, "look at the encoder behind the gear, or at the column that it is read from")
+        }));
+        Ok(reduced)
     }
 
     /// Checks a log, looks at it before anything is made of it, and prepares it.

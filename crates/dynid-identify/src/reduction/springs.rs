@@ -11,9 +11,12 @@
 //! width of a hysteresis that turns with the sign `s` of the motor's speed, `b` backlash that the load and friction behind it close on one flank or the other. The load is
 //! the recipe's: robots of a type share their links, and a change of `c` is then one of the spring.
 
+use std::ops::Range;
+
 use dynid_factor::groups::ReducedGroup;
-use dynid_factor::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder, FactorError};
 use dynid_model::{EffortModel, MotionBlock, Owner, Parameter, RegressorBlock, RobotModel};
+use dynid_motion::log::moves;
 use dynid_motion::shift::shift;
 use dynid_motion::spikes::{self, SpikeSettings};
 use dynid_motion::{Channel, SignalError};
@@ -261,7 +264,18 @@ impl Springs {
         out
     }
 
-    /// Factors of the deformations of a log, each an output of its own behind the `outputs` of the model, their columns from `first` on.
+    /// Joints whose motors move in a log, and whose links do not by their encoders: these are dead, and tell no deformation.
+    pub(super) fn dead<'a>(&'a self, model: &RobotModel, log: &PreparedLog) -> Vec<&'a str> {
+        let is_dead = |joint: &&str| {
+            let name = channel(joint);
+            let link = log.channels.iter().find(|c| c.name == name);
+            log.moves[output(model, joint)] && link.is_some_and(|link| !moves(&link.values))
+        };
+        self.joints.iter().map(|spring| spring.elastic.joint.as_str()).filter(is_dead).collect()
+    }
+
+    /// Factors of the deformations of a log in so many time blocks, each an output of its own behind the `outputs` of the model, their columns from
+    /// `first` on.
     ///
     /// # Errors
     /// [`Error::Conditioning`] where a signal cannot be filtered.
@@ -270,23 +284,26 @@ impl Springs {
         model: &RobotModel,
         log: &PreparedLog,
         (outputs, first): (usize, usize),
+        blocks: usize,
     ) -> Result<Vec<ReducedGroup>, Error> {
         let rows = self.rows(model, log).map_err(|e| Error::Conditioning(e.into()))?;
+        let dead = self.dead(model, log);
         let mut at = first;
         let mut groups = Vec::with_capacity(rows.len());
         for (j, (rows, spring)) in rows.iter().zip(&self.joints).enumerate() {
             let p = if rows.on_both_flanks() { spring.columns.len() } else { FLANKS };
-            let factor = factor(&rows.columns[..p], &rows.deformation).map_err(|source| {
+            let n = rows.deformation.len();
+            let of_block = |b: usize| {
+                factor(&rows.columns[..p], &rows.deformation, b * n / blocks..(b + 1) * n / blocks)
+            };
+            let blocks = (0..blocks).map(of_block).collect::<Result<Vec<_>, FactorError>>();
+            let blocks = blocks.map_err(|source| {
                 Error::Conditioning(ConditioningError::Rows { output: outputs + j, source })
             })?;
             let columns = (at..at + p).collect();
-            groups.push(ReducedGroup {
-                log: 0,
-                output: outputs + j,
-                scale: 0,
-                columns,
-                blocks: vec![factor],
-            });
+            if !dead.contains(&spring.elastic.joint.as_str()) {
+                groups.push(ReducedGroup { log: 0, output: outputs + j, scale: 0, columns, blocks });
+            }
             at += spring.columns.len();
         }
         Ok(groups)
@@ -325,7 +342,7 @@ impl DeformationRows {
     /// Whether the load presses on both flanks, in a way of its own.
     fn on_both_flanks(&self) -> bool {
         let [others @ .., flanks] = &self.columns;
-        let own = factor(others, flanks).map_or(0.0, |f| f.rho().powi(2));
+        let own = factor(others, flanks, 0..flanks.len()).map_or(0.0, |f| f.rho().powi(2));
         own > BOTH_FLANKS.powi(2) * flanks.len() as f64
     }
 }
@@ -346,10 +363,12 @@ fn without_mean(mut x: Vec<f64>) -> Vec<f64> {
     x
 }
 
-fn factor(columns: &[Vec<f64>], deformation: &[f64]) -> Result<Factor, dynid_factor::FactorError> {
+/// Factor of a run of rows.
+fn factor(columns: &[Vec<f64>], deformation: &[f64], rows: Range<usize>) -> Result<Factor, FactorError> {
     let mut builder = FactorBuilder::new(columns.len());
-    builder.push_with(deformation.len(), |column, range, out| {
-        out.copy_from_slice(&columns.get(column).map_or(deformation, Vec::as_slice)[range]);
+    builder.push_with(rows.len(), |column, range, out| {
+        let values = columns.get(column).map_or(deformation, Vec::as_slice);
+        out.copy_from_slice(&values[rows.clone()][range]);
     })?;
     Ok(builder.finish())
 }

@@ -118,7 +118,7 @@ pub(super) fn carried(fleet: &Fleet) -> Vec<usize> {
     (0..fleet.varying.len()).filter(|k| !fleet.varying[*k].watched).collect()
 }
 
-/// The efforts of a log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
+/// A log in two halves of its time blocks; `None` where one of them lacks rows that the log has.
 fn halves(log: usize, reduced: &ReducedLog, recipe: &Recipe) -> Option<LogHalves> {
     let half = |second: bool| -> Option<Vec<ChannelFactor>> {
         let channel = |g: &dynid_factor::groups::ReducedGroup| {
@@ -131,8 +131,7 @@ fn halves(log: usize, reduced: &ReducedLog, recipe: &Recipe) -> Option<LogHalves
                 factor: Factor::merge(&own),
             })
         };
-        let of_efforts = |g: &&dynid_factor::groups::ReducedGroup| g.output < recipe.outputs.len();
-        reduced.groups.iter().filter(of_efforts).filter(|g| g.rows() > 0).map(channel).collect()
+        reduced.groups.iter().filter(|g| g.rows() > 0).map(channel).collect()
     };
     Some(LogHalves { log, halves: [half(false)?, half(true)?] })
 }
