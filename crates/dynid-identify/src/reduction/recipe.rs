@@ -288,11 +288,9 @@ pub fn check_payload_link(robot: &Robot, link: &str) -> Result<(), Error> {
     let names: Vec<&str> = robot.mechanism.bodies().iter().map(|body| body.name.as_str()).collect();
     match names.contains(&link) {
         true => Ok(()),
-        false => Err(Error::setting(
-            "link of the payload",
-            &format!("a moving link: `{}`", names.join("`, `")),
-            link,
-        )),
+        false => {
+            Err(Error::setting("payload.link", &format!("a moving link: `{}`", names.join("`, `")), link))
+        }
     }
 }
 
