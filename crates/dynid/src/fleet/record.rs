@@ -527,7 +527,7 @@ impl FleetResult {
             "fo" => "an offset: zero or brake, cable, current sensor".to_owned(),
             DELAY => "the delay of the effort: drive, bus, or what logs them".to_owned(),
             COMPLIANCE | "k1" | "k2" => "the spring of the joint: crack or loose bolt of gear, belt or flange; or another load than before".to_owned(),
-            BACKLASH => "play of the gear: wear of its teeth, a loose coupling or key".to_owned(),
+            BACKLASH => "play of the gear: wear of its teeth, a loose coupling or key; up to a third more than told where much friction lies behind the spring".to_owned(),
             HYSTERESIS => "friction behind the spring or in the gear: bearing or seal of the link, preload".to_owned(),
             LAG => "the record of the link: its encoder, bus, or what logs them; or viscous friction behind the spring".to_owned(),
             _ if self.built.covariates.is_empty() => {
