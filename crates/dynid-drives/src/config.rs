@@ -10,9 +10,13 @@ use dynid_identify::settings::PerJoint;
 use dynid_logs::MappingSpec;
 use dynid_logs::columns::SignalSpec;
 use dynid_servo::{
-    Addition, Bodies, Channel, Choice, EffortAt, Hold, Limited, LoadOf, ServoSettings, Shared, Term,
+    Addition, Bodies, Channel, Choice, EffortAt, EncoderAt, Hold, Limited, LoadOf, ServoSettings, Shared,
+    Term,
 };
+
 use serde::{Deserialize, Serialize};
+
+use super::gears::Gears;
 
 /// A robot, its logs of commands and positions, and what is known of its drives. Every key but `robot` and `log` has a default.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
@@ -143,7 +147,19 @@ pub struct DriveConfig {
     /// Relative error that masses of the robot file may have, 95 %, beside `bodies = "found"`. Default 0.5.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body_error: Option<f64>,
-    /// Terms that are found besides, one per joint: `dead_band`, `rate_limit`, `smoothing_time`, `effort_limit`. Default: none.
+    /// Stiffness of gears that give way, where it is known, N m/rad. Default: the `k1` of joints that are `elastic` in the robot file, else gears are stiff.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub gear_stiffness: PerJoint,
+    /// Damping of such gears, where it is known, N m s/rad. Default: the `d` of the robot file, else 0.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub gear_damping: PerJoint,
+    /// Backlash of such gears, from flank to flank, where it is known, rad. Default: 0.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub backlash: PerJoint,
+    /// Which side of gears that give way encoders sit on. Default `motor`.
+    pub encoder: EncoderName,
+    /// Terms that are found besides, one per joint: `dead_band`, `rate_limit`, `smoothing_time`, `effort_limit`; `compliance`, `gear_damping` and `backlash` of gears, where they
+    /// are not stated. Default: none.
     pub find: Vec<FoundName>,
     /// What load friction grows with. Default `drive`.
     pub load: LoadName,
@@ -176,6 +192,10 @@ impl Default for DriveConfig {
             law: None,
             bodies: BodiesName::File,
             body_error: None,
+            gear_stiffness: PerJoint::default(),
+            gear_damping: PerJoint::default(),
+            backlash: PerJoint::default(),
+            encoder: EncoderName::Motor,
             find: Vec::new(),
             load: LoadName::Drive,
             step_s: None,
@@ -204,6 +224,17 @@ pub enum EffortAtName {
     #[default]
     Drive,
     /// Between gear and link, where a joint torque sensor sits.
+    Link,
+}
+
+/// Which side of a gear that gives way encoders sit on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EncoderName {
+    /// On the motor, as in geared drives of industry.
+    #[default]
+    Motor,
+    /// On the link, as the potentiometer of a hobby servo.
     Link,
 }
 
@@ -290,6 +321,12 @@ pub enum FoundName {
     SmoothingTime,
     /// Largest effort, from the stated one.
     EffortLimit,
+    /// Compliance of gears, rad/(N m).
+    Compliance,
+    /// Damping of gears that give way, N m s/rad.
+    GearDamping,
+    /// Backlash of gears that give way, rad.
+    Backlash,
 }
 
 /// What load friction grows with.
@@ -438,6 +475,7 @@ impl DriveConfig {
         let direction = s.direction.finite("servo.direction", &names)?;
         let zero = s.zero.finite("servo.zero", &names)?;
         let delay = s.delay.not_negative("servo.delay", &names)?;
+        let gears = Gears::of(s, robot, &names)?;
         for (joint, (low, high)) in &s.command_limits {
             if !names.contains(joint) {
                 return Err(Error::UnknownJoint { name: joint.clone(), known: names.clone() });
@@ -477,9 +515,15 @@ impl DriveConfig {
                     FoundName::SmoothingTime => {
                         joint.set(Term::SmoothingTime, FIRST_SMOOTHING.max(0.5 * period))
                     }
-                    FoundName::RateLimit | FoundName::EffortLimit => {}
+                    // What a gear begins from is looked for.
+                    _ => {}
                 }
             }
+            out.known_gear[j] = gears.set(joint, j);
+            joint.encoder = match s.encoder {
+                EncoderName::Motor => EncoderAt::Motor,
+                EncoderName::Link => EncoderAt::Link,
+            };
             out.find_direction[j] = s.find_directions && direction[j].is_none();
             out.known_gain[j] = gain[j].is_some();
             out.known_damping[j] = damping[j].is_some();
@@ -560,6 +604,9 @@ impl FoundName {
             FoundName::RateLimit => Term::RateLimit,
             FoundName::SmoothingTime => Term::SmoothingTime,
             FoundName::EffortLimit => Term::EffortLimit,
+            FoundName::Compliance => Term::Compliance,
+            FoundName::GearDamping => Term::GearDamping,
+            FoundName::Backlash => Term::Backlash,
         }
     }
 }

@@ -12,10 +12,10 @@ use dynid_robots::mjcf::{self, JointParameters};
 use dynid_robots::robot;
 use dynid_robots::urdf::{self, JointDynamics};
 use dynid_servo::identify::EffortUse;
-use dynid_servo::{Channel, ServoJoint, Term};
+use dynid_servo::{Channel, EncoderAt, ServoJoint, Term};
 use serde_json::{Value, json};
 
-use super::ServoResult;
+use super::{ServoResult, gears};
 
 /// Files of an identification, by name.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +92,8 @@ impl ServoResult {
                 damping: j.get(Term::Viscous),
                 friction_loss: j.get(Term::Coulomb),
                 armature: j.get(Term::RotorInertia),
+                sticks: true,
+                gear: gears::gear(j, 0.0),
                 ..spring(name)
             })
             .collect();
@@ -105,6 +107,11 @@ impl ServoResult {
         let stem = robot::stem(&self.robot.path);
         let actuators = self.actuators_xml(&names);
         if let Some(text) = source.mjcf_text() {
+            let joints = gears::placed(
+                joints,
+                |joints| Ok(mjcf::edit(text, &own, &links, joints)?.remove(0).text),
+                &own,
+            )?;
             let mut edited = mjcf::edit(text, &own, &links, &joints)?;
             files.push((format!("{stem}.xml"), edited.remove(0).text));
             let folder = own.parent().unwrap_or(Path::new(""));
@@ -138,7 +145,8 @@ impl ServoResult {
                 let link = description.links.iter_mut().find(|l| l.name == *name);
                 link.into_iter().for_each(|l| l.inertia = Some(*inertia));
             }
-            let text = mjcf::from_description(&description, &joints)?;
+            let write = |joints: &[JointParameters]| mjcf::from_description(&description, joints);
+            let text = write(&gears::placed(joints, write, Path::new(""))?)?;
             files.push((format!("{stem}.mujoco.xml"), with_actuators(&text, &actuators, &names)));
         }
         files.push(("actuators.xml".to_owned(), format!("<mujoco>\n{actuators}</mujoco>\n")));
@@ -178,13 +186,36 @@ impl ServoResult {
             "friction at rest has no place in MJCF and URDF, Coulomb friction alone is written",
         );
         note(Term::Delay, "delay the commands by the seconds that actuators.json states");
+        note(
+            Term::Compliance,
+            "gears that give way have no place in URDF; MJCF has a joint `<joint>_gear` of their own behind the drive's",
+        );
         note(Term::DeadBand, "dead bands are in actuators.json alone");
         note(Term::RateLimit, "rate limits of commands are in actuators.json alone");
         note(Term::SmoothingTime, "smoothing of commands is in actuators.json alone");
+        let named = |is: &dyn Fn(&ServoJoint) -> bool| -> Vec<String> {
+            let all = names.iter().zip(&self.found.values.joints);
+            all.filter(|(_, j)| is(j)).map(|(name, _)| name.clone()).collect()
+        };
+        let bare = named(&|j| j.get(Term::Compliance) > 0.0 && j.get(Term::RotorInertia) == 0.0);
+        if !bare.is_empty() {
+            notes.push(format!(
+                "a gear needs a rotor on its other side, and is stiff in MJCF without one: {}",
+                bare.join(", ")
+            ));
+        }
+        let link = named(&reads_link);
+        if !link.is_empty() {
+            notes.push(format!(
+                "an actuator of MJCF does not read the link behind a gear: those of these joints are efforts, close their loops with the sum of both joints as actuators.json says: {}",
+                link.join(", ")
+            ));
+        }
         notes
     }
 
-    /// `<actuator>` with one affine actuator per joint: `force = gain · ctrl + bias`, `ctrl` the command as it stands in the log.
+    /// `<actuator>` with one affine actuator per joint: `force = gain · ctrl + bias`, `ctrl` the command as it stands in the log; the effort itself for drives that read
+    /// a link behind a gear.
     fn actuators_xml(&self, names: &[String]) -> String {
         let mut out = String::from("  <actuator>\n");
         for (name, j) in names.iter().zip(&self.found.values.joints) {
@@ -205,6 +236,14 @@ impl ServoResult {
                 d => format!(" <!-- delay {d} s -->"),
             };
             let name = dynid_robots::mjcf::escaped(name);
+            if reads_link(j) {
+                let _infallible = writeln!(
+                    out,
+                    "    <motor name=\"servo_{name}\" joint=\"{name}\"{}/> <!-- reads its link: close the loop outside, `ctrl` is the effort -->",
+                    range.replace("force", "ctrl")
+                );
+                continue;
+            }
             let _infallible = writeln!(
                 out,
                 "    <general name=\"servo_{name}\" joint=\"{name}\" gaintype=\"fixed\" biastype=\"affine\" gainprm=\"{}\" \
@@ -244,6 +283,13 @@ impl ServoResult {
                     "dead_band": j.get(Term::DeadBand),
                     "rate_limit": finite(Term::RateLimit),
                     "smoothing_time": j.get(Term::SmoothingTime),
+                    "gear_stiffness": (j.get(Term::Compliance) > 0.0).then(|| 1.0 / j.get(Term::Compliance)),
+                    "gear_damping": j.get(Term::GearDamping),
+                    "backlash": j.get(Term::Backlash),
+                    "encoder": match j.encoder {
+                        EncoderAt::Motor => "motor",
+                        EncoderAt::Link => "link",
+                    },
                     "torque_constant": told_constant(name).then(|| j.get(Term::TorqueConstant)),
                     "zero": j.get(Term::Zero),
                     "direction": j.direction,
@@ -254,7 +300,7 @@ impl ServoResult {
             "schema": 1,
             "robot": self.robot.file.description.name,
             "about": "effort = stiffness (direction command + zero - q) - damping dq; friction, armature and offset act against it; command \
-                      delayed; units N m, rad, s, for joints that slide N, m, s; torque_constant in N m/A",
+                      delayed; with a gear_stiffness the drive moves a rotor behind a spring, and q is what the encoder reads; units N m, rad, s, for joints that slide N, m, s; torque_constant in N m/A",
             "joints": rows,
         })
     }
@@ -282,6 +328,9 @@ impl ServoResult {
             Term::Offset,
             Term::Zero,
             Term::Delay,
+            Term::Compliance,
+            Term::GearDamping,
+            Term::Backlash,
         ];
         for term in terms {
             let values: Vec<String> = joints.iter().map(|j| format!("{:?}", j.get(term))).collect();
@@ -300,6 +349,11 @@ impl ServoResult {
         );
         out + "\n#endif\n"
     }
+}
+
+/// Whether a drive follows the link behind a gear that gives way.
+fn reads_link(joint: &ServoJoint) -> bool {
+    joint.get(Term::Compliance) > 0.0 && joint.encoder == EncoderAt::Link
 }
 
 /// An MJCF of ours with other actuators: motors of joints that have one give way to it.

@@ -6,6 +6,7 @@
 pub mod config;
 mod files;
 mod found;
+mod gears;
 mod logs;
 mod record;
 mod report;
@@ -29,7 +30,7 @@ use dynid_servo::identify::{LEAST_ROWS, ServoError, ServoIdentification, identif
 use dynid_servo::{Channel, ServoLog, ServoSettings, ServoValues, Simulated, Term};
 
 use dynid_identify::estimate::InputRecord;
-use dynid_identify::robot::{Robot, RobotOptions, refuse_elastic, refuse_loops};
+use dynid_identify::robot::{Robot, RobotOptions, refuse_loops};
 use dynid_identify::{Error, Fault};
 use dynid_model::JointKind;
 
@@ -214,7 +215,7 @@ pub fn identify_servo(
         inputs.extend(log.inputs.iter().cloned());
     }
     let logs: Vec<ServoLog> = training.into_iter().map(|l| l.log).collect();
-    let validation: Vec<ServoLog> = validation.into_iter().map(|l| l.log).collect();
+    let mut validation: Vec<ServoLog> = validation.into_iter().map(|l| l.log).collect();
     if robot.rate_names().is_empty() {
         return Err(ServoFault::NoJoint { robot: config.robot.display().to_string() }.into());
     }
@@ -241,6 +242,8 @@ pub fn identify_servo(
         };
         Some((0..logs.len()).map(of).collect())
     };
+    // Sums begin where those of the fit do.
+    validation.iter_mut().for_each(|log| log.settle_s = found.settle_s);
     let lost = vec![vec![f64::NAN; settings.joints.len()]; validation.len()];
     let validation_rms =
         if validation.is_empty() { Vec::new() } else { rms(&found.values, &validation).unwrap_or(lost) };
@@ -372,7 +375,6 @@ pub fn clamped(
     }
     let robot = if options.locked.is_empty() { plain } else { Robot::load(file, &options)? };
     refuse_loops(&robot, "identified from commands and positions")?;
-    refuse_elastic(&robot, "identified from commands and positions")?;
     let of_robot = |joint: &String| robot.rate_names().contains(joint);
     let is_spring = |element: &String| ["spring", "balancer"].contains(&element.as_str());
     let own = robot.elements.per_joint.iter().filter(|(_, list)| list.iter().any(is_spring));
@@ -383,6 +385,14 @@ pub fn clamped(
         warnings.push(format!(
             "a drive has no spring: those of `{}` are left out, and the fit takes their effort for friction and a constant effort",
             sprung.join("`, `")
+        ));
+    }
+    let cubic = robot.elements.elastic.iter().filter(|e| e.k2.is_some_and(|k| k != 0.0));
+    let cubic: Vec<&str> = cubic.map(|e| e.joint.as_str()).collect();
+    if !cubic.is_empty() {
+        warnings.push(format!(
+            "gears of drives are linear springs: the cubic stiffness of `{}` is left out",
+            cubic.join("`, `")
         ));
     }
     // What the file says of bodies is what the scale of all efforts hangs on.

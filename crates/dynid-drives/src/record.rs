@@ -663,6 +663,22 @@ impl ServoResult {
         told.map(|(names, what)| format!("{} {what}", names.join(", "))).collect()
     }
 
+    /// Gears that are as stiff as the rows can show.
+    fn doubts_of_gears(&self, parameters: &[ServoParameterRecord]) -> Vec<String> {
+        let stiff = |p: &&ServoParameterRecord| {
+            p.term == Term::Compliance.name()
+                && matches!(p.verdict, ServoVerdict::AtBound | ServoVerdict::NotSeen)
+        };
+        let stiff: Vec<String> = parameters.iter().filter(stiff).map(|p| p.joints.join(", ")).collect();
+        if stiff.is_empty() {
+            return Vec::new();
+        }
+        vec![format!(
+            "gears as stiff as the rows can show: {}; their links swing faster than half the rate of the rows, or hardly: move with steps or chirps, and log more often",
+            stiff.join(", ")
+        )]
+    }
+
     /// What is to be said of bodies that were to be found.
     fn doubts_of_bodies(&self) -> Vec<String> {
         let f = &self.found;
@@ -713,6 +729,7 @@ impl ServoResult {
                 "{log}: {rows} readings of the {channel} of {joint} stand out alone of what the fit misses and are left out"
             ));
         }
+        out.extend(self.doubts_of_gears(parameters));
         out.extend(self.doubts_of_efforts());
         out.extend(self.doubts_of_bodies());
         if f.step_share > 0.1 {

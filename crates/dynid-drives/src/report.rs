@@ -312,11 +312,23 @@ fn body_trials(file: &ServoFile) -> StudyTable {
 
 fn law(file: &ServoFile) -> String {
     let plain = "rotor inertia, viscous and Coulomb friction, delay";
-    if file.law.additions.is_empty() {
-        plain.to_owned()
-    } else {
-        format!("{plain}; {}", file.law.additions.join(", "))
+    let gears = file.joints.iter().filter(|j| of_gear(file, j).is_some());
+    let gears: Vec<&str> = gears.map(String::as_str).collect();
+    let mut out = plain.to_owned();
+    if !gears.is_empty() {
+        out += &format!("; gears that give way: {}", gears.join(", "));
     }
+    if !file.law.additions.is_empty() {
+        out += &format!("; {}", file.law.additions.join(", "));
+    }
+    out
+}
+
+/// Compliance of a joint's gear that was found to give way.
+fn of_gear<'a>(file: &'a ServoFile, joint: &str) -> Option<&'a ServoParameterRecord> {
+    let is =
+        |p: &&ServoParameterRecord| p.term == Term::Compliance.name() && p.joints.iter().any(|j| j == joint);
+    file.parameters.iter().find(is)
 }
 
 fn row(name: &str, values: &[f64]) -> Vec<Value> {
@@ -345,15 +357,20 @@ fn section(file: &ServoFile, j: usize, joint: &str, unit: &str, charts: Vec<Char
         .iter()
         .any(|p| matches!(p.verdict, ServoVerdict::Unstable | ServoVerdict::AtBound | ServoVerdict::NotSeen));
     let f = &file.fit;
+    let mut facts = vec![
+        Fact::new("RMS over whole rollouts", f.rms.get(j).copied(), unit),
+        Fact::new("command as prediction", f.command_rms.get(j).copied(), unit),
+        Fact::new("encoder's rounding", f.floor.get(j).copied(), unit),
+    ];
+    if let Some(gear) = of_gear(file, joint) {
+        let stiffness = if unit == "m" { "N/m" } else { "N m/rad" };
+        facts.push(Fact::new("stiffness of the gear", 1.0 / gear.value, stiffness));
+    }
     report::JointSection {
         name: joint.to_owned(),
         status: if worst { report::Status::Warn } else { report::Status::Ok },
         state: String::new(),
-        facts: vec![
-            Fact::new("RMS over whole rollouts", f.rms.get(j).copied(), unit),
-            Fact::new("command as prediction", f.command_rms.get(j).copied(), unit),
-            Fact::new("encoder's rounding", f.floor.get(j).copied(), unit),
-        ],
+        facts,
         notes: Vec::new(),
         tables: vec![table],
         curves: None,

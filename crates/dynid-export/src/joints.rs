@@ -102,6 +102,8 @@ pub(crate) fn split(
                 armature: armature.unwrap_or(0.0),
                 stiffness: stiffness.unwrap_or(0.0),
                 spring_reference,
+                sticks: false,
+                gear: None,
             });
         }
     }

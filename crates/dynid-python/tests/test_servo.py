@@ -124,6 +124,82 @@ def test_drives_of_a_mujoco_arm_are_found_and_put_back(tmp_path: Path, seed: int
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "out/whole.xml")).nu == 2
 
 
+def test_gears_that_give_way_are_found_and_put_back(tmp_path: Path) -> None:
+    """Links behind springs with backlash: MuJoCo with a spring of its own is the truth, and the file that is written goes along with it."""
+    mujoco = pytest.importorskip("mujoco")
+    names = list(TRUTH)
+    kp, kv = (np.array([TRUTH[n][k] for n in names]) for k in (0, 1))
+    stiffness, damping, half = np.array([250.0, 60.0]), np.array([0.5, 0.05]), np.array([2e-3, 3e-3])
+
+    def carry(_: Any, data: Any) -> None:
+        lead, rate = -data.qpos[1::2], -data.qvel[1::2]
+        touches = np.abs(lead) >= half
+        data.qfrc_passive[1::2] += np.where(touches, stiffness * (lead - np.sign(lead) * half) + damping * rate, 0.0)
+
+    text = arm({n: TRUTH[n][2:] for n in names})
+    text = text.replace('timestep="0.0005" integrator="implicitfast"', 'timestep="0.00025" integrator="RK4"')
+    text = text.replace('solreffriction="0.001 1"', 'solreffriction="0.0004 1" solimpfriction="0.9999 0.9999 0.001"')
+    for name in names:
+        end = text.index("/>", text.index(f'<joint name="{name}"')) + 2
+        text = f'{text[:end]}<joint name="{name}_soft" axis="0 1 0"/>{text[end:]}'
+    truth = mujoco.MjModel.from_xml_string(text)
+    command = commands(2000, 3)
+    motors = [0, 2]
+
+    def record(model: Any, force: Any) -> np.ndarray[Any, Any]:
+        """Motors along held commands, from rest."""
+        data = mujoco.MjData(model)
+        data.qpos[motors] = command[0]
+        inner = round(PERIOD / model.opt.timestep)
+        rows = []
+        for k in range(-300 * inner, len(command) * inner):
+            if k >= 0 and k % inner == 0:
+                rows.append(data.qpos[motors].copy())
+            told = command[max(0, k - round(DELAY / model.opt.timestep)) // inner]
+            force(data, told)
+            mujoco.mj_step(model, data)
+        return np.array(rows)
+
+    def push(data: Any, told: np.ndarray[Any, Any]) -> None:
+        data.qfrc_applied[motors] = kp * (told - data.qpos[motors]) - kv * data.qvel[motors]
+
+    mujoco.set_mjcb_passive(carry)
+    try:
+        exact = record(truth, push)
+    finally:
+        mujoco.set_mjcb_passive(None)
+    # The user's model has a pose, which counts coordinates.
+    plain = arm().replace("</mujoco>", '<keyframe><key name="up" qpos="0.1 0.2"/></keyframe></mujoco>')
+    (tmp_path / "arm.xml").write_text(plain)
+    head = ",".join(["t", *(f"cmd_{n}" for n in names), *(f"q_{n}" for n in names)])
+    position = np.round(exact / STEP) * STEP
+    table = np.column_stack([np.arange(len(command)) * PERIOD, command, position])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=head, comments="", fmt="%.9g")
+    (tmp_path / "servo.toml").write_text(
+        'robot = "arm.xml"\n[[log]]\npath = "log.csv"\n[servo]\ngains = "own"\nvelocity_gain = { shoulder = 1.5, elbow = 1.0 }\n'
+        'law = []\nfind = ["compliance", "gear_damping", "backlash"]\n'
+    )
+    ended = subprocess.run([*PROGRAM, "servo", "servo.toml", "--out", "out"], cwd=tmp_path, capture_output=True, check=False)
+    assert ended.returncode == 0, ended.stderr.decode()
+    found = json.loads((tmp_path / "out/servo.json").read_text())
+    assert found["fit"]["misfit"] < 1.1, found["fit"]
+    for p in found["parameters"]:
+        true = {"compliance": 1 / stiffness, "backlash": 2 * half}.get(p["term"])
+        if true is not None:
+            k = names.index(p["joints"][0])
+            assert p["interval"][0] <= true[k] <= p["interval"][1], p
+            assert abs(p["value"] / true[k] - 1) < 0.1, p
+
+    actuators = (tmp_path / "out/actuators.xml").read_text()
+    inner = actuators[actuators.index("<actuator>") : actuators.index("</actuator>") + len("</actuator>")]
+    back = mujoco.MjModel.from_xml_string((tmp_path / "out/arm.xml").read_text().replace("</mujoco>", inner + "</mujoco>"))
+    assert [back.joint(k).name for k in range(back.njnt)] == ["shoulder", "shoulder_gear", "elbow", "elbow_gear"]
+    assert back.key_qpos.tolist() == [[0.1, 0.0, 0.2, 0.0]]
+    driven = record(back, lambda data, told: data.ctrl.__setitem__(slice(None), told))
+    error = np.sqrt(np.mean((driven - exact) ** 2))
+    assert error < 0.2e-3, f"{error} rad"
+
+
 ARM = """<robot name="arm">
   <link name="base"/>
   <link name="upper"><inertial><origin xyz="0.15 0 0"/><mass value="1.2"/>

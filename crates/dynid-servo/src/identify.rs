@@ -6,16 +6,18 @@
 //! 3. Efforts and currents that were measured, as far as they are those of the drives that the positions tell: they join the sum of squares, each
 //!    weighted by its own noise.
 //! 4. Bodies, where they are to be found: they deviate from those of the robot file as far as folds that were not fitted ask for it.
-//! 5. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
-//! 6. The step of the simulation is halved until it does not matter. Where nothing but rounding is left, encoders that stand still count less, row by
+//! 5. Gears that give way, where they are to be found.
+//! 6. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
+//! 7. The step of the simulation is halved until it does not matter. Where nothing but rounding is left, encoders that stand still count less, row by
 //!    row, and the step is halved once more.
-//! 7. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
+//! 8. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
 //!    other gains ([`Spread`]). Where the model is wrong these decide.
-//! 8. Verdicts and groups of parameters that only act together.
+//! 9. Verdicts and groups of parameters that only act together.
 
 mod bodies;
 mod channels;
 mod efforts;
+mod gears;
 mod outliers;
 mod result;
 mod verdict;
@@ -111,6 +113,8 @@ pub fn identify(
         outliers: Vec::new(),
         by_span: Vec::new(),
         bodies: Vec::new(),
+        gears: Vec::new(),
+        settle_s: logs.iter().map(|log| log.settle_s).collect(),
         blocks: blocks(logs, settings.blocks),
         // A clock that jitters a little is no reason for another step.
         scheme: Scheme {
@@ -136,6 +140,7 @@ pub fn identify(
     let directions = work.directions(&mut known, &plain, &laws)?;
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
+    work.forget_starts(&begin);
     let mut free = work.free(&laws);
     let mut fitted = work.first_fit(&free, begin, &GaussNewton::default())?;
     if work.leave_out(&fitted, 0)? {
@@ -158,6 +163,9 @@ pub fn identify(
     let mut of_bodies = FoundBodies::default();
     if settings.bodies == Bodies::Found {
         of_bodies = work.find_bodies(mechanism, &laws, &mut fitted, &mut folds, &sigma)?;
+    }
+    if settings.find.iter().any(|t| t.is_of_gear()) {
+        work.find_gears(&laws, &mut fitted, &mut folds, &sigma)?;
     }
     if settings.choice == Choice::HeldOut {
         loop {
@@ -251,6 +259,10 @@ struct Work<'a> {
     by_span: Vec<(Free, f64)>,
     /// Numbers of bodies that deviate.
     bodies: Vec<Free>,
+    /// Terms of gears that give way.
+    gears: Vec<Free>,
+    /// Least time behind the beginning of a rollout that no sum holds, by log.
+    settle_s: Vec<f64>,
     blocks: Vec<Block>,
     scheme: Scheme,
     evaluations: usize,
@@ -347,7 +359,10 @@ impl Work<'_> {
 
     fn free(&self, laws: &BTreeSet<Addition>) -> Vec<Free> {
         let mut free = self.settings.free(self.chains, laws, &self.measured);
-        free.extend(self.bodies.iter().cloned());
+        // Of what gears say of a joint's rotor.
+        free.retain(|f| !self.gears.iter().any(|g| g.target == f.target));
+        // Bodies stand last: what is said of them is taken off the end.
+        free.extend(self.gears.iter().chain(&self.bodies).cloned());
         free
     }
 
@@ -603,6 +618,7 @@ impl Work<'_> {
             evaluations: self.evaluations,
             unsettled: (count.unsettled, count.steps),
             blocks: self.blocks.len(),
+            settle_s: self.logs.iter().map(|log| log.settle_s).fold(0.0, f64::max),
             values: fitted.values,
         })
     }

@@ -33,6 +33,16 @@ pub enum Hold {
     Line,
 }
 
+/// Which side of a gear that gives way an encoder sits on: its drive follows commands there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum EncoderAt {
+    /// On the motor, as in geared drives of industry.
+    #[default]
+    Motor,
+    /// On the link, as the potentiometer of a hobby servo.
+    Link,
+}
+
 /// A joint with its drive:
 ///
 /// ```text
@@ -43,6 +53,10 @@ pub enum Hold {
 ///
 /// with the encoder's position `x`, direction `s`, the command `u` after clamp, delay, rate limit and smoothing, the commanded
 /// velocity `w` and effort `f` (0 if not logged) and the dead band `db`.
+///
+/// Where the gear gives way ([`Term::Compliance`] above 0) the drive moves a coordinate `θ` of its own with rotor inertia and friction, and the link `q` is
+/// moved by what the gear carries: `τ_g = k db(θ - q) + d (θ' - q')` with a dead band of half the backlash (Spong 1987). The encoder, and the
+/// drive's control error with it, is that of `θ` or `q`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ServoJoint {
     values: [f64; Term::COUNT],
@@ -52,6 +66,8 @@ pub struct ServoJoint {
     pub limited: Limited,
     /// Least and largest commanded reading that the drive takes: it clamps others. Infinite: it takes all.
     pub command_limits: (f64, f64),
+    /// Where the encoder sits: matters for gears that give way.
+    pub encoder: EncoderAt,
 }
 
 impl Default for ServoJoint {
@@ -61,6 +77,7 @@ impl Default for ServoJoint {
             direction: 1.0,
             limited: Limited::Whole,
             command_limits: (f64::NEG_INFINITY, f64::INFINITY),
+            encoder: EncoderAt::Motor,
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A robot on a fixed base is told positions by its drives' commands and logs where its encoders are. [`ServoJoint`] is the law of
 //! one joint behind its drive: position and velocity gain, limits, dead band, delay and shaping of the command, rotor inertia, friction that
-//! sticks, the encoder's zero and direction.
+//! sticks, a gear that gives way, the encoder's zero and direction.
 //!
 //! | question | where |
 //! |---|---|
@@ -21,6 +21,7 @@ mod deviation;
 pub mod fit;
 pub mod forecast;
 mod free;
+mod gear;
 pub mod identify;
 mod joint;
 mod log;
@@ -35,7 +36,7 @@ pub use chain::Chain;
 pub use channel::{Channel, EffortAt};
 pub use deviation::{Body, DEVIATIONS};
 pub use free::{Free, Known, ServoValues, Target};
-pub use joint::{Hold, Limited, LoadOf, Scheme, ServoJoint};
+pub use joint::{EncoderAt, Hold, Limited, LoadOf, Scheme, ServoJoint};
 pub use log::ServoLog;
 pub use measured::Measured;
 pub use rollout::{Count, Lost, Rollout, Simulated, SimulatedEffort, SimulatedRow};

@@ -7,6 +7,7 @@ use std::ops::Range;
 use crate::chain::{Chain, Equation};
 use crate::deviation::{Body, DEVIATIONS};
 use crate::free::{Free, ServoValues, Target};
+use crate::gear::Layout;
 use crate::joint::{LoadOf, Scheme};
 use crate::log::{Command, ServoLog};
 use crate::step::{Begin, Drive, Numbers, Solver, Wanted};
@@ -16,6 +17,10 @@ use sensed::Sensed;
 /// Farthest that a simulated joint may go before the simulation counts as lost, rad or m.
 const FAR: f64 = 1e3;
 
+/// Slope of a position over any parameter, in SI units, beyond which a simulation counts as lost: a motion between flanks may be so much one of chance that
+/// its slopes grow without end, and say nothing.
+const STEEP: f64 = 1e8;
+
 /// The simulated state of a chain at a row of the log.
 #[derive(Debug, Clone, Copy)]
 pub struct SimulatedRow<'a> {
@@ -23,7 +28,7 @@ pub struct SimulatedRow<'a> {
     pub row: usize,
     /// Encoder readings of the chain's joints, not rounded.
     pub reading: &'a [f64],
-    /// Velocities of the joints.
+    /// Velocities of the joints, where their encoders sit.
     pub velocity: &'a [f64],
     /// Efforts of the drives in the middle of the last step.
     pub effort: &'a [f64],
@@ -222,9 +227,13 @@ struct Shaped {
 
 struct Run<'a> {
     rollout: &'a Rollout<'a>,
+    /// Number of joints.
     n: usize,
     p: usize,
     joints: Vec<Numbers>,
+    layout: Layout,
+    /// Numbers by coordinate.
+    parts: Vec<Numbers>,
     commands: Vec<Shaped>,
     equation: Equation<'a>,
     solver: Solver,
@@ -238,6 +247,7 @@ struct Run<'a> {
     before: Vec<f64>,
     acceleration: Vec<f64>,
     reading: Vec<f64>,
+    velocity: Vec<f64>,
     effort: Vec<f64>,
     sensed: Sensed,
     slopes: Slopes,
@@ -248,15 +258,19 @@ struct Run<'a> {
 
 /// Slopes over the free parameters, row-major.
 struct Slopes {
+    /// By coordinate.
     q: Vec<f64>,
     v: Vec<f64>,
     wanted: Vec<f64>,
-    limited: Vec<f64>,
-    smoothed: Vec<f64>,
     drive: Vec<f64>,
     rhs: Vec<f64>,
+    /// By joint.
+    limited: Vec<f64>,
+    smoothed: Vec<f64>,
     reading: Vec<f64>,
+    velocity: Vec<f64>,
     effort: Vec<f64>,
+    /// By coordinate, in the middle of the step.
     half: Vec<f64>,
     /// Of the velocities in the middle as they are foreseen, and of the accelerations of the step before.
     ahead: Vec<f64>,
@@ -282,41 +296,48 @@ impl<'a> Run<'a> {
             limited: 0.0,
             smoothed: 0.0,
         };
-        let zeros = || vec![0.0; n * p];
+        let layout = Layout::new(&chain.joints, values);
+        let joints: Vec<Numbers> = chain.joints.iter().map(|j| Numbers::of(&values.joints[*j])).collect();
+        let m = layout.len();
+        let (zeros, of_joints) = (|| vec![0.0; m * p], || vec![0.0; n * p]);
         Run {
             rollout,
             n,
             p,
-            joints: chain.joints.iter().map(|j| Numbers::of(&values.joints[*j])).collect(),
+            parts: layout.numbers(&joints),
+            joints,
             commands: chain.joints.iter().map(shaped).collect(),
             equation: Equation::new(chain, &values.inertias),
-            solver: Solver::new(n, rollout.scheme),
-            wanted: vec![Wanted::default(); n],
-            q: vec![0.0; n],
-            v: vec![0.0; n],
-            middle: vec![0.0; n],
-            ahead: vec![0.0; n],
-            before: vec![0.0; n],
-            acceleration: vec![0.0; n],
+            solver: Solver::new(m, rollout.scheme),
+            wanted: vec![Wanted::default(); m],
+            q: vec![0.0; m],
+            v: vec![0.0; m],
+            middle: vec![0.0; m],
+            ahead: vec![0.0; m],
+            before: vec![0.0; m],
+            acceleration: vec![0.0; m],
             reading: vec![0.0; n],
+            velocity: vec![0.0; n],
             effort: vec![0.0; n],
             sensed: Sensed::new(rollout, values, log),
             slopes: Slopes {
                 q: zeros(),
                 v: zeros(),
                 wanted: zeros(),
-                limited: zeros(),
-                smoothed: zeros(),
                 drive: zeros(),
                 rhs: zeros(),
-                reading: zeros(),
-                effort: zeros(),
+                limited: of_joints(),
+                smoothed: of_joints(),
+                reading: of_joints(),
+                velocity: of_joints(),
+                effort: of_joints(),
                 half: zeros(),
                 ahead: zeros(),
                 accelerated: zeros(),
                 before: vec![0.0; p],
             },
             of_bodies: rollout.columns.iter().map(|c| c.of_body(values)).collect(),
+            layout,
             steps: 0,
         }
     }
@@ -344,7 +365,8 @@ impl<'a> Run<'a> {
                     self.sense((begin, h), rows.end, log, see);
                 }
             }
-            if !self.q.iter().chain(&self.v).all(|x| x.abs() < FAR) {
+            let steep = self.slopes.q.iter().any(|s| s.abs() > STEEP);
+            if steep || !self.q.iter().chain(&self.v).all(|x| x.abs() < FAR) {
                 return Err(Lost { row });
             }
             self.show(row, see);
@@ -359,12 +381,15 @@ impl<'a> Run<'a> {
     /// At rest, or moving as the first readings do.
     fn begin(&mut self, row: usize, log: &ServoLog) {
         let given = log.start.as_ref().filter(|_| row == 0);
-        let Run { rollout, n, p, joints, commands, .. } = self;
+        let Run { rollout, p, joints, commands, layout, .. } = self;
         for (j, robot) in rollout.chain.joints.iter().enumerate() {
             let joint = &joints[j];
             let reading = given.map_or(log.position[*robot][row], |start| start[*robot]);
-            self.q[j] = joint.direction * reading + joint.zero;
-            self.v[j] = if given.is_some() { 0.0 } else { joint.direction * first_speed(log, *robot, row) };
+            let q = joint.direction * reading + joint.zero;
+            let v = if given.is_some() { 0.0 } else { joint.direction * first_speed(log, *robot, row) };
+            for c in [j, layout.motor[j]] {
+                (self.q[c], self.v[c]) = (q, v);
+            }
             let shaped = &mut commands[j];
             shaped.at = [row; 3];
             let first = joint.direction * shaped.position.mean(log.time[row], 1e-9, joint.delay, &mut 0).0;
@@ -377,20 +402,57 @@ impl<'a> Run<'a> {
         }
         for (c, column) in rollout.columns.iter().enumerate() {
             if let Kind::Term(Term::Zero, of) = &column.kind {
-                of.iter().for_each(|j| slopes.q[j * *p + c] = 1.0);
+                of.iter().flat_map(|j| [*j, layout.motor[*j]]).for_each(|i| slopes.q[i * *p + c] = 1.0);
             }
         }
-        self.effort = vec![0.0; *n];
-        self.before = vec![0.0; *n];
+        self.effort.fill(0.0);
+        self.before.fill(0.0);
+        self.wind_gears();
+    }
+
+    /// Gears carry the bodies' effort at rest: the side of them that no encoder reads is moved. By the position alone, its slopes to first order in
+    /// the compliance.
+    fn wind_gears(&mut self) {
+        let Run { rollout, n, p, layout, equation, slopes, .. } = self;
+        if layout.gears.is_empty() {
+            return;
+        }
+        let still = vec![0.0; *n];
+        equation.values(&self.q[..*n], &still);
+        if *p > 0 && rollout.of_inertias {
+            equation.regressors(&self.q[..*n], &still, &still);
+        }
+        for gear in &layout.gears {
+            let j = layout.joint[gear.motor];
+            let carried = equation.bias[j];
+            let lead = carried / gear.stiffness + carried.signum() * gear.play;
+            // The other side of the encoder.
+            let (at, sign) =
+                if layout.sensor[j] == gear.motor { (gear.link, -1.0) } else { (gear.motor, 1.0) };
+            self.q[at] += sign * lead;
+            for (c, column) in rollout.columns.iter().enumerate() {
+                let own = &equation.bias_regressor[j * equation.columns()..][..equation.columns()];
+                slopes.q[at * *p + c] += sign
+                    * match &column.kind {
+                        Kind::Term(Term::Compliance, of) if of.contains(&j) => carried,
+                        Kind::Term(Term::Backlash, of) if of.contains(&j) => 0.5 * carried.signum(),
+                        Kind::Term(..) => 0.0,
+                        _ => column.of_regressor(&self.of_bodies[c], own).unwrap_or(0.0) / gear.stiffness,
+                    };
+            }
+        }
     }
 
     fn show(&mut self, row: usize, see: &mut impl FnMut(Simulated<'_>)) {
-        let Run { rollout, p, joints, slopes, .. } = self;
+        let Run { rollout, p, joints, slopes, layout, .. } = self;
         for (j, joint) in joints.iter().enumerate() {
-            self.reading[j] = joint.direction * (self.q[j] - joint.zero);
-            let from = &slopes.q[j * *p..][..*p];
-            let to = &mut slopes.reading[j * *p..][..*p];
-            to.iter_mut().zip(from).for_each(|(t, f)| *t = joint.direction * f);
+            let at = layout.sensor[j];
+            self.reading[j] = joint.direction * (self.q[at] - joint.zero);
+            self.velocity[j] = self.v[at];
+            let (from, own) = (at * *p..(at + 1) * *p, j * *p..(j + 1) * *p);
+            let to = &mut slopes.reading[own.clone()];
+            to.iter_mut().zip(&slopes.q[from.clone()]).for_each(|(t, f)| *t = joint.direction * f);
+            slopes.velocity[own].copy_from_slice(&slopes.v[from]);
         }
         for (c, column) in rollout.columns.iter().enumerate() {
             if let Kind::Term(Term::Zero, of) = &column.kind {
@@ -400,17 +462,17 @@ impl<'a> Run<'a> {
         see(Simulated::Row(SimulatedRow {
             row,
             reading: &self.reading,
-            velocity: &self.v,
+            velocity: &self.velocity,
             effort: &self.effort,
             by_parameter: &slopes.reading,
             effort_by_parameter: &slopes.effort,
-            velocity_by_parameter: &slopes.v,
+            velocity_by_parameter: &slopes.velocity,
         }));
     }
 
     /// What the drives are told over a step.
     fn command(&mut self, t: f64, h: f64) {
-        let Run { rollout, p, joints, commands, slopes, wanted, .. } = self;
+        let Run { rollout, p, joints, commands, slopes, wanted, layout, .. } = self;
         for (j, (joint, shaped)) in joints.iter().zip(commands).enumerate() {
             let ask = |command: &Option<Command>, at: &mut usize| {
                 command.as_ref().map_or(0.0, |c| joint.direction * c.mean(t, h, joint.delay, at).0)
@@ -446,7 +508,7 @@ impl<'a> Run<'a> {
                         _ => {}
                     }
                 }
-                let wanted = &mut slopes.wanted[range.clone()];
+                let wanted = &mut slopes.wanted[layout.motor[j] * *p..][..*p];
                 if joint.smoothing > 0.0 {
                     let faster = -(1.0 - share) * h / (joint.smoothing * joint.smoothing);
                     let smooth = &mut slopes.smoothed[range];
@@ -463,21 +525,23 @@ impl<'a> Run<'a> {
                 }
             }
             (shaped.limited, shaped.smoothed) = (limited, smoothed);
-            wanted[j] = Wanted { position, velocity, effort };
+            wanted[layout.motor[j]] = Wanted { position, velocity, effort };
         }
     }
 
     fn step(&mut self, t: f64, h: f64) {
         self.steps += 1;
         self.command(t, h);
-        for j in 0..self.n {
+        let (n, m) = (self.n, self.layout.len());
+        for j in 0..m {
             self.middle[j] = self.q[j] + 0.5 * h * self.v[j];
             let gained = if self.rollout.scheme.middle { 0.5 * h * self.before[j] } else { 0.0 };
             self.ahead[j] = self.v[j] + gained;
         }
-        self.equation.values(&self.middle, &self.ahead);
+        self.equation.values(&self.middle[..n], &self.ahead[..n]);
         let begin = Begin {
-            joints: &self.joints,
+            joints: &self.parts,
+            layout: &self.layout,
             ahead: (&self.middle, &self.ahead),
             wanted: &self.wanted,
             mass: &self.equation.mass,
@@ -487,13 +551,13 @@ impl<'a> Run<'a> {
             h,
         };
         self.solver.step(&begin);
-        for (effort, drive) in self.effort.iter_mut().zip(&self.solver.drive) {
-            *effort = drive.effort;
+        for (effort, motor) in self.effort.iter_mut().zip(&self.layout.motor) {
+            *effort = self.solver.drive[*motor].effort;
         }
         if self.p > 0 {
             self.sensitivities(h);
         }
-        for j in 0..self.n {
+        for j in 0..m {
             let next = self.solver.next[j];
             self.before[j] = (next - self.v[j]) / h;
             self.q[j] += 0.5 * h * (self.v[j] + next);
@@ -503,17 +567,18 @@ impl<'a> Run<'a> {
 
     /// Differentiates the step that was just solved: the residual's slope at fixed `v⁺`, then the tangent.
     fn sensitivities(&mut self, h: f64) {
-        let (n, p) = (self.n, self.p);
-        for j in 0..n {
+        let (n, m, p) = (self.n, self.layout.len(), self.p);
+        for j in 0..m {
             self.acceleration[j] = (self.solver.next[j] - self.v[j]) / h;
         }
+        let (middle, rates, accelerations) = (&self.middle[..n], &self.ahead[..n], &self.acceleration[..n]);
         let loaded = self.joints.iter().any(|j| j.load > 0.0) || self.has(Term::LoadFriction);
         let by_bodies = loaded && self.rollout.scheme.load == LoadOf::Bodies;
-        self.equation.slopes(&self.middle, &self.ahead, &self.acceleration, by_bodies);
+        self.equation.slopes(middle, rates, accelerations, by_bodies);
         if self.rollout.of_inertias {
-            self.equation.regressors(&self.middle, &self.ahead, &self.acceleration);
+            self.equation.regressors(middle, rates, accelerations);
         }
-        let (equation, solver) = (&self.equation, &self.solver);
+        let (equation, solver, layout) = (&self.equation, &self.solver, &self.layout);
         let in_middle = self.rollout.scheme.middle;
         let Slopes { q, v, wanted, drive, rhs, half, ahead, accelerated, effort, before: row_before, .. } =
             &mut self.slopes;
@@ -523,26 +588,36 @@ impl<'a> Run<'a> {
         for (ahead, (v, a)) in ahead.iter_mut().zip(v.iter().zip(accelerated.iter())) {
             *ahead = if in_middle { v + 0.5 * h * a } else { *v };
         }
-        for j in 0..n {
-            let joint = &self.joints[j];
+        let mean_of = |c: usize| 0.5 * (self.v[c] + solver.next[c]);
+        for j in 0..m {
+            let joint = &self.parts[j];
             let own = j * p..(j + 1) * p;
             let at = solver.drive[j];
-            let mean = 0.5 * (self.v[j] + solver.next[j]);
+            let mean = mean_of(j);
             let begin = self.v[j];
+            let (link, driven, reads) = (layout.joint[j], layout.is_driven(j), layout.reads(j));
+            // Bodies are those of links.
+            let bodies = if j < n { n } else { 0 };
             let sign = solver.by_level(joint, j, begin);
             let row = &mut drive[own.clone()];
             let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * joint.kd;
-            for (to, i) in row.iter_mut().zip(own.clone()) {
-                *to = at.by_error * (wanted[i] - q[i]) - quarter * v[i];
+            for (to, (i, read)) in row.iter_mut().zip(own.clone().zip(reads * p..)) {
+                *to = at.by_error * (wanted[i] - q[read]) - quarter * v[read];
             }
-            self.rollout.by_drive(j, &at, self.wanted[j].velocity - mean, row);
+            if driven {
+                self.rollout.by_drive(link, &at, self.wanted[j].velocity - mean_of(reads), row);
+            }
             let to = &mut rhs[own.clone()];
             let by_begin = 0.5 * joint.viscous + solver.kink(joint, j, begin).2;
             for c in 0..p {
                 to[c] = by_begin * v[own.start + c] - row[c];
             }
-            for k in 0..n {
-                let inertia = equation.mass[j * n + k] + if j == k { joint.rotor } else { 0.0 };
+            let over = joint.rotor / h;
+            for (to, v) in to.iter_mut().zip(&v[own.clone()]) {
+                *to -= over * v;
+            }
+            for k in 0..bodies {
+                let inertia = equation.mass[j * n + k];
                 let by_position = equation.by_position[j * n + k];
                 let (by_rate, over) = (equation.by_rate[j * n + k], inertia / h);
                 let (half, ahead, v) = (&half[k * p..][..p], &ahead[k * p..][..p], &v[k * p..][..p]);
@@ -556,8 +631,8 @@ impl<'a> Run<'a> {
                 match self.rollout.scheme.load {
                     LoadOf::Bodies => {
                         for k in 0..n {
-                            let by_position = level * equation.bias_by_position[j * n + k];
-                            let by_rate = level * equation.by_rate[j * n + k];
+                            let by_position = level * equation.bias_by_position[link * n + k];
+                            let by_rate = level * equation.by_rate[link * n + k];
                             let (half, ahead) = (&half[k * p..][..p], &ahead[k * p..][..p]);
                             for c in 0..p {
                                 to[c] += by_position * half[c] + by_rate * ahead[c];
@@ -568,11 +643,12 @@ impl<'a> Run<'a> {
                         let before = solver.before[j];
                         let row = &mut *row_before;
                         let (at, rate) = if in_middle { (&*half, &*ahead) } else { (&*q, &*v) };
-                        for (to, i) in row.iter_mut().zip(own.clone()) {
-                            *to = before.by_error * (wanted[i] - at[i])
-                                - before.by_damping * joint.kd * rate[i];
+                        for (to, (i, read)) in row.iter_mut().zip(own.clone().zip(reads * p..)) {
+                            *to = before.by_error * (wanted[i] - at[read])
+                                - before.by_damping * joint.kd * rate[read];
                         }
-                        self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.ahead[j], row);
+                        let lag = self.wanted[j].velocity - self.ahead[reads];
+                        self.rollout.by_drive(link, &before, lag, row);
                         for c in 0..p {
                             to[c] += level * row[c];
                         }
@@ -584,7 +660,7 @@ impl<'a> Run<'a> {
             let decay = (-x * x).exp();
             for (c, column) in self.rollout.columns.iter().enumerate() {
                 match &column.kind {
-                    Kind::Term(term, of) if of.contains(&j) => {
+                    Kind::Term(term, of) if driven && of.contains(&link) => {
                         to[c] += match term {
                             Term::RotorInertia => self.acceleration[j],
                             Term::Viscous => mean,
@@ -600,32 +676,59 @@ impl<'a> Run<'a> {
                     }
                     Kind::Term(..) => {}
                     Kind::Inertia(_) | Kind::Body(..) => {
-                        let own = j * equation.columns()..(j + 1) * equation.columns();
+                        let own = link * equation.columns()..(link + 1) * equation.columns();
                         let slope = |regressor: &[f64]| {
                             column.of_regressor(&self.of_bodies[c], &regressor[own.clone()]).unwrap_or(0.0)
                         };
-                        to[c] += slope(&equation.regressor);
+                        if bodies > 0 {
+                            to[c] += slope(&equation.regressor);
+                        }
                         if self.rollout.scheme.load == LoadOf::Bodies {
                             to[c] += level * slope(&equation.bias_regressor);
                         }
                     }
                 }
             }
-            if solver.side[j] == 0.0 {
-                to.fill(0.0);
+        }
+        for (gear, at) in layout.gears.iter().zip(&solver.gears) {
+            let joint = layout.joint[gear.motor];
+            let quarter = 0.25 * h * at.by_lead + 0.5 * at.by_rate;
+            let rate = mean_of(gear.motor) - mean_of(gear.link);
+            for (c, column) in self.rollout.columns.iter().enumerate() {
+                let (motor, link) = (gear.motor * p + c, gear.link * p + c);
+                let mut by = at.by_lead * (q[motor] - q[link]) + quarter * (v[motor] - v[link]);
+                if let Kind::Term(term, of) = &column.kind
+                    && of.contains(&joint)
+                {
+                    by += match term {
+                        Term::Compliance => -at.twist * at.by_lead * gear.stiffness,
+                        Term::GearDamping => at.side * at.side * rate,
+                        Term::Backlash => -0.5 * at.side * at.by_lead,
+                        _ => 0.0,
+                    };
+                }
+                rhs[motor] += by;
+                rhs[link] -= by;
+            }
+        }
+        for (j, side) in solver.side.iter().enumerate() {
+            if *side == 0.0 {
+                rhs[j * p..(j + 1) * p].fill(0.0);
             }
         }
         solver.tangent.solve(rhs, p);
-        for j in 0..n {
-            let at = solver.drive[j];
+        for i in 0..m * p {
+            let next = -rhs[i];
+            accelerated[i] = (next - v[i]) / h;
+            q[i] += 0.5 * h * (v[i] + next);
+            v[i] = next;
+        }
+        for (j, motor) in layout.motor.iter().enumerate() {
+            let at = solver.drive[*motor];
             let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * self.joints[j].kd;
-            for i in j * p..(j + 1) * p {
-                let next = -rhs[i];
-                effort[i] = drive[i] - quarter * next;
-                accelerated[i] = (next - v[i]) / h;
-                q[i] += 0.5 * h * (v[i] + next);
-                v[i] = next;
-            }
+            let (drive, next) = (&drive[motor * p..][..p], &v[layout.sensor[j] * p..][..p]);
+            let to = &mut effort[j * p..][..p];
+            to.iter_mut().zip(drive.iter().zip(next)).for_each(|(t, (d, n))| *t = d - quarter * n);
         }
     }
 

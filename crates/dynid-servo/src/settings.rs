@@ -114,7 +114,9 @@ pub struct ServoSettings {
     pub find_direction: Vec<bool>,
     /// Standard deviation of zeros about those of the robot file, rad or m. Default 0.5.
     pub zero_std: f64,
-    /// Terms that are found besides, each for every joint: dead band, limits, smoothing.
+    /// Terms of gears that are known, per joint: [`ServoSettings::find`] leaves them.
+    pub known_gear: Vec<BTreeSet<Term>>,
+    /// Terms that are found besides, each for every joint: dead band, limits, smoothing; compliance, damping and backlash of gears.
     pub find: Vec<Term>,
     /// How additions are chosen.
     pub choice: Choice,
@@ -149,6 +151,7 @@ impl ServoSettings {
             known_zero: vec![false; joints],
             find_direction: vec![false; joints],
             zero_std: 0.5,
+            known_gear: vec![BTreeSet::new(); joints],
             find: Vec::new(),
             choice: Choice::HeldOut,
             bodies: Bodies::File,
@@ -171,7 +174,7 @@ impl ServoSettings {
     /// besides, and those of the additions.
     ///
     /// Where efforts are `measured`: their zeros, torque constants and velocity gains that are not known, their delay, and known position gains
-    /// within the error that they may have.
+    /// within the error that they may have. Gears are apart: [`ServoSettings::free_gears`].
     pub fn free(&self, chains: &[Chain], laws: &BTreeSet<Addition>, measured: &Measured) -> Vec<Free> {
         let s = self;
         let n = s.joints.len();
@@ -195,7 +198,8 @@ impl ServoSettings {
                 Shared::Own => out.extend(own(Term::Delay)),
             }
         }
-        for term in &s.find {
+        // Gears give way as far as a search finds it.
+        for term in s.find.iter().filter(|t| !t.is_of_gear()) {
             out.extend(own(*term));
         }
         out.extend(s.of_measured(measured, laws.contains(&Addition::OwnGains)));
@@ -221,6 +225,17 @@ impl ServoSettings {
         }
         out
     }
+
+    /// What is asked of gears that give way already.
+    pub fn free_gears(&self) -> Vec<Free> {
+        let asked = |j: usize| {
+            let soft = self.joints[j].get(Term::Compliance) > 0.0;
+            let terms = self.find.iter().filter(move |t| soft && t.is_of_gear());
+            terms.filter(move |t| !self.known_gear[j].contains(t)).map(move |t| Free::term(*t, [j]))
+        };
+        (0..self.joints.len()).flat_map(asked).collect()
+    }
+
     /// What measured efforts ask for and tell.
     fn of_measured(&self, measured: &Measured, own_gains: bool) -> Vec<Free> {
         let s = self;

@@ -20,7 +20,11 @@
 //! joint at rest has the set `[-1, 1]` for `s`.
 //!
 //! Without [`Scheme::middle`]: `w = v`, `L` and `s` at `v⁺`.
+//!
+//! Where gears give way, `q` holds the links and then the motors behind such gears: links have no drive and no friction of their own, motors no
+//! bodies, and the effort of the gear, taken at `q_a` and `v_a`, stands with one sign at the motor and with the other at the link.
 
+use crate::gear::{Carried, Layout};
 use crate::joint::{Limited, LoadOf, Scheme, ServoJoint};
 use crate::term::Term;
 
@@ -77,6 +81,11 @@ impl Numbers {
             direction: joint.direction,
             limited: joint.limited,
         }
+    }
+
+    /// Those of a link that no drive moves.
+    pub(crate) fn none() -> Self {
+        Numbers::of(&ServoJoint::default())
     }
 
     /// Friction without load at a speed, and its slope over the speed.
@@ -162,8 +171,12 @@ pub(crate) struct Solver {
     pub(crate) before: Vec<Drive>,
     /// Steps that did not settle.
     pub(crate) unsettled: usize,
+    /// What gears carry at the solution.
+    pub(crate) gears: Vec<Carried>,
     residual: Vec<f64>,
     slope: Vec<f64>,
+    /// Slopes of drives by the velocity of another coordinate, that they read.
+    beside: Vec<f64>,
     change: Vec<f64>,
     /// Velocities that friction of one sign and of the other are apart by at the end of a step, per friction: of joints that turn.
     turning: Vec<f64>,
@@ -180,7 +193,9 @@ struct Turn {
 
 /// What a step begins from.
 pub(crate) struct Begin<'a> {
+    /// By coordinate.
     pub(crate) joints: &'a [Numbers],
+    pub(crate) layout: &'a Layout,
     /// Positions and velocities in the middle of the step, as they are foreseen.
     pub(crate) ahead: (&'a [f64], &'a [f64]),
     pub(crate) wanted: &'a [Wanted],
@@ -189,6 +204,15 @@ pub(crate) struct Begin<'a> {
     pub(crate) q: &'a [f64],
     pub(crate) v: &'a [f64],
     pub(crate) h: f64,
+}
+
+impl Begin<'_> {
+    /// Entry of the inertia of bodies and rotors.
+    fn inertia(&self, row: usize, column: usize) -> f64 {
+        let links = self.layout.links;
+        let bodies = if row.max(column) < links { self.mass[row * links + column] } else { 0.0 };
+        if row == column { bodies + self.joints[row].rotor } else { bodies }
+    }
 }
 
 impl Solver {
@@ -202,8 +226,10 @@ impl Solver {
             carried: vec![0.0; n],
             before: vec![Drive::default(); n],
             unsettled: 0,
+            gears: Vec::new(),
             residual: vec![0.0; n],
             slope: vec![0.0; n],
+            beside: vec![0.0; n],
             change: vec![0.0; n],
             turning: vec![0.0; n],
             tangent: Tangent::new(n),
@@ -212,21 +238,37 @@ impl Solver {
 
     /// Residual without friction of the sign, and the diagonal of its slope beside the inertia, at velocities `self.next`.
     fn smooth(&mut self, b: &Begin<'_>) {
-        let n = self.n;
-        for j in 0..n {
+        let links = b.layout.links;
+        let mean = |next: &[f64], c: usize| 0.5 * (b.v[c] + next[c]);
+        let middle = |mean: f64, c: usize| b.q[c] + 0.5 * b.h * mean;
+        for j in 0..self.n {
             let joint = &b.joints[j];
-            let mean = 0.5 * (b.v[j] + self.next[j]);
-            let middle = b.q[j] + 0.5 * b.h * mean;
-            let drive = joint.drive(b.wanted[j], middle, mean);
             let mut inertial = joint.rotor * (self.next[j] - b.v[j]);
-            for k in 0..n {
-                inertial += b.mass[j * n + k] * (self.next[k] - b.v[k]);
+            let mut bias = 0.0;
+            if j < links {
+                for k in 0..links {
+                    inertial += b.mass[j * links + k] * (self.next[k] - b.v[k]);
+                }
+                bias = b.bias[j];
             }
-            self.residual[j] =
-                inertial / b.h + b.bias[j] - drive.effort + joint.viscous * mean + joint.offset;
-            self.slope[j] =
-                0.25 * b.h * drive.by_error + 0.5 * drive.by_damping * joint.kd + 0.5 * joint.viscous;
+            let reads = b.layout.reads(j);
+            let read = mean(&self.next, reads);
+            let drive = joint.drive(b.wanted[j], middle(read, reads), read);
+            let viscous = joint.viscous * mean(&self.next, j);
+            self.residual[j] = inertial / b.h + bias - drive.effort + viscous + joint.offset;
+            let by_read = 0.25 * b.h * drive.by_error + 0.5 * drive.by_damping * joint.kd;
+            (self.slope[j], self.beside[j]) = if reads == j { (by_read, 0.0) } else { (0.0, by_read) };
+            self.slope[j] += 0.5 * joint.viscous;
             self.drive[j] = drive;
+        }
+        self.gears.clear();
+        for gear in &b.layout.gears {
+            let (motor, link) = (mean(&self.next, gear.motor), mean(&self.next, gear.link));
+            let lead = middle(motor, gear.motor) - middle(link, gear.link);
+            let carried = gear.carry(lead, motor - link);
+            self.residual[gear.motor] += carried.effort;
+            self.residual[gear.link] -= carried.effort;
+            self.gears.push(carried);
         }
     }
 
@@ -299,9 +341,9 @@ impl Solver {
 
     /// Finds `2 h/μ` of a joint at rest, `μ` the inertia that it alone would move, the others that slip yielding.
     fn find_turning(&mut self, b: &Begin<'_>, j: usize) {
-        self.slope.fill(0.0);
         self.side[j] = 1.0;
-        self.tangent.fill(b, &self.slope, &self.side);
+        self.tangent.fill_inertia(b, &self.side);
+        self.tangent.factor();
         self.side[j] = 0.0;
         self.change.fill(0.0);
         self.change[j] = 1.0;
@@ -318,10 +360,11 @@ impl Solver {
     pub(crate) fn step(&mut self, b: &Begin<'_>) {
         for j in 0..self.n {
             self.carried[j] = match self.scheme.load {
-                LoadOf::Bodies => b.bias[j],
+                LoadOf::Bodies => b.bias[b.layout.joint[j]],
                 LoadOf::Drive => {
+                    let c = b.layout.reads(j);
                     let (q, v) =
-                        if self.scheme.middle { (b.ahead.0[j], b.ahead.1[j]) } else { (b.q[j], b.v[j]) };
+                        if self.scheme.middle { (b.ahead.0[c], b.ahead.1[c]) } else { (b.q[c], b.v[c]) };
                     self.before[j] = b.joints[j].drive(b.wanted[j], q, v);
                     self.before[j].effort
                 }
@@ -363,7 +406,8 @@ impl Solver {
     fn step_with_rest(&mut self, b: &Begin<'_>) {
         for j in 0..self.n {
             let v = b.v[j];
-            self.side[j] = if v > 0.0 {
+            // A link behind a gear that gives way has no friction: it never sticks.
+            self.side[j] = if v > 0.0 || !b.layout.is_driven(j) {
                 1.0
             } else if v < 0.0 {
                 -1.0
@@ -377,7 +421,7 @@ impl Solver {
                 let (friction, slope, _) = self.kink(&b.joints[j], j, b.v[j]);
                 self.residual[j] += friction;
                 // The falling part of Stribeck's curve, as far as the inertia outweighs it: cut off, the rounds would creep.
-                let least = -0.5 * (b.mass[j * self.n + j] + b.joints[j].rotor) / b.h;
+                let least = -0.5 * b.inertia(j, j) / b.h;
                 self.slope[j] = (self.slope[j] + slope).max(least);
             }
             self.solve_change(b);
@@ -389,7 +433,8 @@ impl Solver {
             let one_by_one = round >= FREE_ROUNDS;
             let mut turned = false;
             for j in 0..self.n {
-                if self.side[j] != 0.0 && self.next[j] * self.side[j] < 0.0 && !(turned && one_by_one) {
+                let against = self.next[j] * self.side[j] < 0.0 && b.layout.is_driven(j);
+                if against && !(turned && one_by_one) {
                     if self.turns(j, b.v[j]) {
                         // It does not turn after all.
                         self.side[j] = -self.side[j];
@@ -433,9 +478,8 @@ impl Solver {
 
     /// Change of velocities that the residual asks for; joints that stick have none.
     fn solve_change(&mut self, b: &Begin<'_>) {
-        let n = self.n;
-        self.tangent.fill(b, &self.slope, &self.side);
-        for j in 0..n {
+        self.fill_tangent(b);
+        for j in 0..self.n {
             self.change[j] = if self.side[j] == 0.0 { 0.0 } else { -self.residual[j] };
         }
         self.tangent.solve(&mut self.change, 1);
@@ -447,47 +491,75 @@ impl Solver {
         for j in 0..self.n {
             self.slope[j] += self.kink(&b.joints[j], j, b.v[j]).1;
         }
-        self.tangent.fill(b, &self.slope, &self.side);
+        self.fill_tangent(b);
+    }
+
+    fn fill_tangent(&mut self, b: &Begin<'_>) {
+        let tangent = &mut self.tangent;
+        tangent.fill_inertia(b, &self.side);
+        for j in 0..self.n {
+            tangent.add(j, j, self.slope[j], &self.side);
+            tangent.add(j, b.layout.reads(j), self.beside[j], &self.side);
+        }
+        for (gear, carried) in b.layout.gears.iter().zip(&self.gears) {
+            let slope = 0.25 * b.h * carried.by_lead + 0.5 * carried.by_rate;
+            for (row, column, sign) in [
+                (gear.motor, gear.motor, 1.0),
+                (gear.link, gear.link, 1.0),
+                (gear.motor, gear.link, -1.0),
+                (gear.link, gear.motor, -1.0),
+            ] {
+                tangent.add(row, column, sign * slope, &self.side);
+            }
+        }
+        tangent.factor();
     }
 }
 
-/// `(M + I_a)/h` and a diagonal, factored as `L D Lᵀ` without pivoting: the inertia leads, rows of joints that stick are those of the
+/// `(M + I_a)/h` and slopes of efforts, factored as `L U` without pivoting: the inertia leads, rows of joints that stick are those of the
 /// identity.
 #[derive(Debug)]
 pub(crate) struct Tangent {
     n: usize,
-    lower: Vec<f64>,
+    /// Row-major; factored, `L` with ones on its diagonal below that of `U`.
+    entries: Vec<f64>,
 }
 
 impl Tangent {
     fn new(n: usize) -> Self {
-        Tangent { n, lower: vec![0.0; n * n] }
+        Tangent { n, entries: vec![0.0; n * n] }
     }
 
-    fn fill(&mut self, b: &Begin<'_>, slope: &[f64], side: &[f64]) {
+    fn fill_inertia(&mut self, b: &Begin<'_>, side: &[f64]) {
         let n = self.n;
         for j in 0..n {
-            for k in 0..=j {
+            for k in 0..n {
                 let moves = side[j] != 0.0 && side[k] != 0.0;
-                let entry = if moves { b.mass[j * n + k] / b.h } else { 0.0 };
-                self.lower[j * n + k] = entry;
+                let still = if j == k { 1.0 } else { 0.0 };
+                self.entries[j * n + k] = if moves { b.inertia(j, k) / b.h } else { still };
             }
-            let own = if side[j] == 0.0 { 1.0 } else { b.joints[j].rotor / b.h + slope[j] };
-            self.lower[j * n + j] += own;
         }
-        for j in 0..n {
-            for k in 0..j {
-                let mut sum = self.lower[j * n + k];
-                for i in 0..k {
-                    sum -= self.lower[j * n + i] * self.lower[k * n + i] * self.lower[i * n + i];
+    }
+
+    /// Adds a slope where both joints move.
+    fn add(&mut self, row: usize, column: usize, slope: f64, side: &[f64]) {
+        if side[row] != 0.0 && side[column] != 0.0 {
+            self.entries[row * self.n + column] += slope;
+        }
+    }
+
+    fn factor(&mut self) {
+        let n = self.n;
+        for k in 0..n {
+            let (above, below) = self.entries.split_at_mut((k + 1) * n);
+            let pivot_row = &above[k * n + k..];
+            for row in below.chunks_exact_mut(n) {
+                if row[k] != 0.0 {
+                    row[k] /= pivot_row[0];
+                    let factor = row[k];
+                    subtract(&mut row[k + 1..], factor, &pivot_row[1..]);
                 }
-                self.lower[j * n + k] = sum / self.lower[k * n + k];
             }
-            let mut pivot = self.lower[j * n + j];
-            for i in 0..j {
-                pivot -= self.lower[j * n + i] * self.lower[j * n + i] * self.lower[i * n + i];
-            }
-            self.lower[j * n + j] = pivot;
         }
     }
 
@@ -498,16 +570,16 @@ impl Tangent {
             let (above, own) = rhs.split_at_mut(j * columns);
             let own = &mut own[..columns];
             for k in 0..j {
-                subtract(own, self.lower[j * n + k], &above[k * columns..][..columns]);
+                subtract(own, self.entries[j * n + k], &above[k * columns..][..columns]);
             }
         }
         for j in (0..n).rev() {
             let (own, below) = rhs[j * columns..].split_at_mut(columns);
-            let pivot = 1.0 / self.lower[j * n + j];
-            own.iter_mut().for_each(|x| *x *= pivot);
             for k in j + 1..n {
-                subtract(own, self.lower[k * n + j], &below[(k - j - 1) * columns..][..columns]);
+                subtract(own, self.entries[j * n + k], &below[(k - j - 1) * columns..][..columns]);
             }
+            let pivot = 1.0 / self.entries[j * n + j];
+            own.iter_mut().for_each(|x| *x *= pivot);
         }
     }
 }

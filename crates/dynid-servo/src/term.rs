@@ -45,11 +45,17 @@ pub enum Term {
     CurrentZero,
     /// Time by which measured efforts and currents lie behind the positions of the same rows, s; negative: ahead.
     EffortDelay,
+    /// Compliance of the gear between drive and link `1/k`, rad/(N m); 0: stiff.
+    Compliance,
+    /// Damping of the gear `d`, N m s/rad.
+    GearDamping,
+    /// Backlash of the gear, rad: the drive turns so far from flank to flank.
+    Backlash,
 }
 
 impl Term {
     /// Number of terms.
-    pub const COUNT: usize = 19;
+    pub const COUNT: usize = 22;
 
     /// All terms, in order.
     pub const ALL: [Term; Term::COUNT] = [
@@ -72,6 +78,9 @@ impl Term {
         Term::EffortZero,
         Term::CurrentZero,
         Term::EffortDelay,
+        Term::Compliance,
+        Term::GearDamping,
+        Term::Backlash,
     ];
 
     /// Name in files.
@@ -96,6 +105,9 @@ impl Term {
             Term::EffortZero => "effort_zero",
             Term::CurrentZero => "current_zero",
             Term::EffortDelay => "effort_delay",
+            Term::Compliance => "compliance",
+            Term::GearDamping => "gear_damping",
+            Term::Backlash => "backlash",
         }
     }
 
@@ -109,8 +121,8 @@ impl Term {
         match (self, slides) {
             (Term::PositionGain, false) => "N m/rad",
             (Term::PositionGain, true) => "N/m",
-            (Term::VelocityGain | Term::Viscous, false) => "N m s/rad",
-            (Term::VelocityGain | Term::Viscous, true) => "N s/m",
+            (Term::VelocityGain | Term::Viscous | Term::GearDamping, false) => "N m s/rad",
+            (Term::VelocityGain | Term::Viscous | Term::GearDamping, true) => "N s/m",
             (Term::RotorInertia, false) => "kg m^2",
             (Term::RotorInertia, true) => "kg",
             (Term::Coulomb | Term::Stiction | Term::Offset | Term::EffortLimit | Term::EffortZero, false) => {
@@ -122,12 +134,14 @@ impl Term {
             (Term::StribeckVelocity | Term::RateLimit, false) => "rad/s",
             (Term::StribeckVelocity | Term::RateLimit, true) => "m/s",
             (Term::LoadFriction, _) => "1",
-            (Term::Zero | Term::DeadBand, false) => "rad",
-            (Term::Zero | Term::DeadBand, true) => "m",
+            (Term::Zero | Term::DeadBand | Term::Backlash, false) => "rad",
+            (Term::Zero | Term::DeadBand | Term::Backlash, true) => "m",
             (Term::Delay | Term::SmoothingTime | Term::EffortDelay, _) => "s",
             (Term::TorqueConstant, false) => "N m/A",
             (Term::TorqueConstant, true) => "N/A",
             (Term::CurrentZero, _) => "A",
+            (Term::Compliance, false) => "rad/(N m)",
+            (Term::Compliance, true) => "m/N",
         }
     }
 
@@ -151,6 +165,11 @@ impl Term {
     /// Whether the term is one of a sensor, which no simulator asks for.
     pub fn is_of_sensor(self) -> bool {
         matches!(self, Term::EffortZero | Term::CurrentZero | Term::EffortDelay)
+    }
+
+    /// Whether the term is one of a gear that gives way.
+    pub fn is_of_gear(self) -> bool {
+        matches!(self, Term::Compliance | Term::GearDamping | Term::Backlash)
     }
 
     /// Values that physics allows.

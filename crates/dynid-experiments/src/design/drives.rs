@@ -116,7 +116,11 @@ impl Drives {
         let sigma = noise(config, found, &joints, &slides, &mut warnings)?;
         let chains = Chain::all(&robot.mechanism);
         Ok(Drives {
-            free: settings.free(&chains, &laws, &Measured::none(settings.joints.len())),
+            free: [
+                settings.free(&chains, &laws, &Measured::none(settings.joints.len())),
+                settings.free_gears(),
+            ]
+            .concat(),
             chains,
             scheme: Scheme {
                 step_s: settings.step_s.unwrap_or(1.1 / rate_hz),

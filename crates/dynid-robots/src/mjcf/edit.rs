@@ -5,14 +5,14 @@ use std::ops::Range;
 use std::path::Path;
 
 use dynid_files::excerpt::closest;
-use dynid_model::{Inertia, Mat3, Placement, Vec3, symmetric};
+use dynid_model::{Inertia, JointKind, Mat3, Placement, Vec3, symmetric};
 
 use super::compiler::Compiler;
 use super::document::{Document, EditedFile, Element};
-use super::model::{BodyPart, Model};
+use super::model::{BodyPart, JointPart, Model};
 use super::orientation::quaternion;
 use super::read::model;
-use super::{JointParameters, unwritable};
+use super::{GearJoint, JointParameters, STICKING, escaped, unwritable};
 use crate::robot_error::{Place, RobotFileError};
 use crate::urdf::inertial::Inertial;
 
@@ -24,7 +24,8 @@ use crate::urdf::inertial::Inertial;
 /// Where `<compiler>` would make something else of stated inertias (`inertiafromgeom="true"`, `balanceinertia`, bounds, a total
 /// mass), these attributes are set to what leaves them alone, and every body that moves states its inertia. A massless link between the
 /// joints of one body has no element and is left as it is. `joints`: `damping`, `frictionloss`, `armature`, `stiffness` and `springref` are set where they differ
-/// from what the joint has already, other attributes are kept. Everything else is byte for byte the input.
+/// from what the joint has already, other attributes are kept; a joint that sticks has `solreffriction` and `solimpfriction` added where it states none. A gear that gives way becomes a second joint behind its own, of the same type, axis and place, and
+/// stands at 0 in all keyframes. Everything else is byte for byte the input.
 ///
 /// # Errors
 /// [`RobotFileError`]: the text is not MJCF, has no such link or joint, holds it as one copy of a `<replicate>` or outside of its folder,
@@ -55,6 +56,7 @@ pub fn edit(
     for joint in joints {
         editor.joint(path, &model, joint)?;
     }
+    editor.keyframes(&model, joints)?;
     if !links.is_empty() && !compiler.takes_inertias_as_stated() {
         let others = model.bodies.iter().filter(|b| !links.iter().any(|(name, _)| *name == b.link));
         for body in others {
@@ -133,7 +135,7 @@ impl<'a> Editor<'a> {
     fn joint(
         &mut self,
         path: &Path,
-        model: &Model<'_>,
+        model: &Model<'a>,
         wanted: &JointParameters,
     ) -> Result<(), RobotFileError> {
         let Some(part) = model.joints.iter().find(|j| j.parameters.joint == wanted.joint) else {
@@ -160,7 +162,66 @@ impl<'a> Editor<'a> {
                 added += &self.set(part.element, key, &format!("{value:?}"));
             }
         }
+        let sticks = wanted.sticks && wanted.friction_loss > 0.0;
+        for (key, value) in STICKING.iter().filter(|(key, _)| sticks && part.element.attribute(key).is_none())
+        {
+            added += &self.set(part.element, key, value);
+        }
         self.add(part.element, added);
+        if let Some(gear) = &wanted.gear {
+            self.gear(part, &wanted.joint, gear)?;
+        }
+        Ok(())
+    }
+
+    /// A gear that gives way, behind the joint that it is of.
+    fn gear(&mut self, part: &JointPart<'a>, joint: &str, gear: &GearJoint) -> Result<(), RobotFileError> {
+        if !gear.is_finite() {
+            return Err(unwritable("joint", joint, "its gear has a number that is not finite".to_owned()));
+        }
+        let element = part.element;
+        let text = self.text(element);
+        let newline = if text.contains("\r\n") { "\r\n" } else { "\n" };
+        let same: Vec<String> = ["class", "type", "axis", "pos", "group"]
+            .into_iter()
+            .filter_map(|key| Some(format!("{key}=\"{}\" ", escaped(element.text(key)?))))
+            .collect();
+        let name = GearJoint::name(joint);
+        let (name, same, more) = (escaped(&name), same.concat(), gear.attributes(part.unit));
+        let indent = indent(text, element.open.start);
+        let written = format!("{newline}{indent}<joint name=\"{name}\" {same}{more}/>");
+        self.splice(element.file, element.end..element.end, written);
+        Ok(())
+    }
+
+    /// Zeros in keyframes for the positions and rates of new joints.
+    fn keyframes(&mut self, model: &Model<'_>, joints: &[JointParameters]) -> Result<(), RobotFileError> {
+        let (mut places, mut qpos, mut qvel) = (Vec::new(), 0, 0);
+        for joint in model.description.joints.iter().filter(|j| j.kind != JointKind::Fixed) {
+            let (positions, rates) = if joint.kind == JointKind::Floating { (7, 6) } else { (1, 1) };
+            (qpos, qvel) = (qpos + positions, qvel + rates);
+            if joints.iter().any(|p| p.joint == joint.name && p.gear.is_some()) {
+                places.push((qpos, qvel));
+            }
+        }
+        if places.is_empty() {
+            return Ok(());
+        }
+        let document = self.document;
+        for key in document.sections("keyframe").flat_map(|s| &s.children) {
+            for (attribute, count, at) in [("qpos", qpos, 0), ("qvel", qvel, 1)] {
+                let Some(value) = key.text(attribute) else { continue };
+                let mut words: Vec<&str> = value.split_ascii_whitespace().collect();
+                if words.len() != count {
+                    let reason = format!("expected {count} numbers, one per position, found {}", words.len());
+                    return Err(unwritable("keyframe", attribute, reason));
+                }
+                for place in places.iter().rev() {
+                    words.insert(if at == 0 { place.0 } else { place.1 }, "0");
+                }
+                self.set(key, attribute, &words.join(" "));
+            }
+        }
         Ok(())
     }
 

@@ -92,6 +92,8 @@ pub(super) fn read(
         armature: parameter("armature")?,
         stiffness,
         spring_reference: if stiffness > 0.0 { reference } else { 0.0 },
+        sticks: false,
+        gear: None,
     };
     Ok(JointElement::Moving(MovingJoint {
         kind,

@@ -54,6 +54,59 @@ pub struct JointParameters {
     pub stiffness: f64,
     /// Position at which that spring is at rest `springref`, rad or m; 0 without a spring.
     pub spring_reference: f64,
+    /// Whether the joint sticks: MuJoCo's own dry friction is soft and creeps, unless `solreffriction` and `solimpfriction` say otherwise. Written, never read.
+    pub sticks: bool,
+    /// A gear that gives way between what the joint's drive moves and the link: a second joint on the same axis. Written, never read.
+    pub gear: Option<GearJoint>,
+}
+
+/// Dry friction as hard as MuJoCo has it, for joints that do not say how hard theirs is: a time constant below two steps of the simulation is taken for two.
+const STICKING: [(&str, &str); 2] =
+    [("solreffriction", "0.0004 1"), ("solimpfriction", "0.9999 0.9999 0.001")];
+
+/// A gear that gives way, as a joint `<joint>_gear` behind the drive's own: the link's position is the sum of both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GearJoint {
+    /// Stiffness, N m/rad or N/m.
+    pub stiffness: f64,
+    /// Damping, N m s/rad or N s/m; with backlash on the flanks alone.
+    pub damping: f64,
+    /// From flank to flank, rad or m.
+    pub backlash: f64,
+    /// Acceleration of the gear joint per effort on it, everything else free, where the model is as drawn (MuJoCo's `dof_invweight0`), 1/(kg m²) or 1/kg. It
+    /// matters with backlash alone.
+    pub mobility: f64,
+}
+
+impl GearJoint {
+    /// Name of the joint.
+    pub fn name(joint: &str) -> String {
+        format!("{joint}_gear")
+    }
+
+    /// Attributes of the joint beside name, type, axis and place; angles in `unit` rad.
+    ///
+    /// A spring does for gears without backlash. Flanks are limits of the joint: a constraint of impedance `d` has the force `-(d/A)(b v + k d r + a)` with the
+    /// inverse inertia `A` that `mobility` states and the acceleration `a` without it, so that direct `solref` `(-K A, -D A)` gives a flank of stiffness `K` and damping `D` but
+    /// for the share `d` of the inertial forces, here 1e-4, the least that is allowed.
+    fn attributes(&self, unit: f64) -> String {
+        let GearJoint { stiffness, damping, backlash, mobility } = *self;
+        let none = "armature=\"0\" frictionloss=\"0\" ref=\"0\" springref=\"0\"";
+        if backlash <= 0.0 {
+            return format!("{none} limited=\"false\" stiffness=\"{stiffness:?}\" damping=\"{damping:?}\"");
+        }
+        let half = 0.5 * backlash / unit;
+        format!(
+            "{none} stiffness=\"0\" damping=\"0\" limited=\"true\" range=\"{:?} {half:?}\" margin=\"0\" solreflimit=\"{:?} {:?}\" solimplimit=\"0.0001 0.0001 0.001\"",
+            -half,
+            -stiffness * mobility,
+            -damping * mobility
+        )
+    }
+
+    fn is_finite(&self) -> bool {
+        [self.stiffness, self.damping, self.backlash, self.mobility].iter().all(|x| x.is_finite())
+    }
 }
 
 /// A name as it stands between the quotes of an attribute.

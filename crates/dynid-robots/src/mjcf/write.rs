@@ -10,7 +10,7 @@ use quick_xml::escape::escape;
 use super::loops::{Constraints, Loops};
 use super::model::WORLD;
 use super::orientation::quaternion;
-use super::{JointParameters, unwritable};
+use super::{GearJoint, JointParameters, STICKING, unwritable};
 use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
 
@@ -22,7 +22,7 @@ use crate::urdf::inertial::Inertial;
 ///   links, and none for links that do not move if no body could have the stated one (MuJoCo would refuse the file).
 /// - Joints: `hinge` (revolute, continuous), `slide` (prismatic), `freejoint`; `ref` is 0, so `qpos` is the position of
 ///   the description. `range` from the limits of revolute and prismatic joints, `damping`, `frictionloss`, `armature`,
-///   `stiffness`, `springref` from `joints` (joints that are not named there: 0).
+///   `stiffness`, `springref` from `joints` (joints that are not named there: 0). A gear that gives way is a second joint behind its own.
 /// - A mimic joint follows its leader by `<equality><joint polycoef="offset ratio 0 0 0"/>`.
 /// - One `<motor>` of gear 1 per joint under the joint's name, its `ctrlrange` the limit of the effort; none for mimic
 ///   joints if the description couples them.
@@ -302,8 +302,24 @@ impl<'a> Writer<'a> {
                     let _ = write!(out, " {key}=\"{value:?}\"");
                 }
             }
+            for (key, value) in STICKING.iter().filter(|_| p.sticks && p.friction_loss > 0.0) {
+                let _ = write!(out, " {key}=\"{value}\"");
+            }
         }
         out.push_str("/>\n");
+        let gear = self.parameters.get(joint.name.as_str()).and_then(|p| p.gear);
+        if let Some(gear) = gear {
+            if !gear.is_finite() {
+                return refuse("its gear has a number that is not finite");
+            }
+            let name = GearJoint::name(&joint.name);
+            let (name, more) = (escape(name.as_str()), gear.attributes(1.0));
+            let _ = writeln!(
+                out,
+                "{:indent$}<joint name=\"{name}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\" {more}/>",
+                ""
+            );
+        }
         Ok(())
     }
 

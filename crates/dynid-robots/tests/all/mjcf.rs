@@ -77,6 +77,7 @@ fn a_tree_with_welded_links_and_awkward_names_reads_back() {
             armature: 1.0 / 3.0,
             stiffness: 2.5,
             spring_reference: -0.1,
+            ..JointParameters::default()
         },
         JointParameters { joint: "slide".into(), damping: 7.0, ..JointParameters::default() },
     ];

@@ -3,7 +3,7 @@
 use std::fs;
 
 use dynid_model::{Inertia, Mat3, Vec3};
-use dynid_robots::mjcf::{self, JointParameters};
+use dynid_robots::mjcf::{self, GearJoint, JointParameters};
 
 const ARM: &str = "<!-- an arm -->\r
 <mujoco   model='arm'>\r
@@ -196,4 +196,43 @@ fn what_cannot_be_edited_is_refused_by_name() {
     let joint = |name: &str, damping| [JointParameters { joint: name.into(), damping, ..Default::default() }];
     assert!(edit(&[], &joint("a", f64::NAN)).to_string().contains("damping is not finite"));
     assert!(edit(&[], &joint("q1", 1.0)).to_string().contains("joint `q1`"));
+}
+
+#[test]
+fn a_gear_that_gives_way_is_a_joint_behind_its_own() {
+    let keyed = ARM.replace(
+        "</mujoco>",
+        "<keyframe><key name='k' qpos='0.1 0.2  0.3' qvel=\"1 2 3\" ctrl='4'/></keyframe>\n</mujoco>",
+    );
+    let gear = |backlash| GearJoint { stiffness: 200.0, damping: 0.5, backlash, mobility: 30.0 };
+    let joint = |name: &str, backlash| JointParameters {
+        joint: name.into(),
+        armature: 0.1,
+        friction_loss: 3.0,
+        sticks: true,
+        gear: Some(gear(backlash)),
+        ..JointParameters::default()
+    };
+    let joints = [joint("b", 0.0), joint("c", std::f64::consts::PI / 180.0)];
+    let text = mjcf::edit(&keyed, "m.xml".as_ref(), &[], &joints).unwrap().remove(0).text;
+    let soft = "\r\n\t\t\t\t<joint name=\"b_gear\" armature=\"0\" frictionloss=\"0\" ref=\"0\" springref=\"0\" limited=\"false\" \
+                stiffness=\"200.0\" damping=\"0.5\"/>";
+    assert!(text.contains(soft), "{text}");
+    // Degrees, as the file has them, and a flank of the stiffness by its mobility.
+    let flanks = "<joint name=\"c_gear\" pos=\"0.1 0 0\" armature=\"0\" frictionloss=\"0\" ref=\"0\" springref=\"0\" stiffness=\"0\" damping=\"0\" \
+                  limited=\"true\" range=\"-0.5 0.5\" margin=\"0\" solreflimit=\"-6000.0 -15.0\" solimplimit=\"0.0001 0.0001 0.001\"/>";
+    assert!(text.contains(flanks), "{text}");
+    assert_eq!(text.matches("solreffriction").count(), 2, "joints that stick say so once");
+    assert!(text.contains("qpos='0.1 0.2 0 0.3 0' qvel=\"1 2 0 3 0\" ctrl='4'"), "{text}");
+    // What is there already is kept, and nothing that is not finite is written.
+    let own = ARM.replace("frictionloss=\"3\"", "frictionloss=\"3\" solreffriction=\"0.01 1\"");
+    let text = mjcf::edit(&own, "m.xml".as_ref(), &[], &joints[1..]).unwrap().remove(0).text;
+    assert_eq!(text.matches("solreffriction").count(), 1, "{text}");
+    let mut wrong = joints[0].clone();
+    wrong.gear = Some(GearJoint { mobility: f64::NAN, ..gear(0.0) });
+    let fault = mjcf::edit(ARM, "m.xml".as_ref(), &[], &[wrong]).unwrap_err().to_string();
+    assert!(fault.contains("gear"), "{fault}");
+    let short = keyed.replace("0.1 0.2  0.3", "0.1");
+    let fault = mjcf::edit(&short, "m.xml".as_ref(), &[], &joints).unwrap_err().to_string();
+    assert!(fault.contains("expected 3 numbers"), "{fault}");
 }

@@ -324,4 +324,6 @@ pub struct ServoIdentification {
     pub unsettled: (usize, usize),
     /// Blocks of the jackknife.
     pub blocks: usize,
+    /// Longest time behind the beginning of a rollout that no sum holds, s: position loops forget it, and links come to rest on gears that give way.
+    pub settle_s: f64,
 }

@@ -188,6 +188,8 @@ pub(crate) fn groups(free: &[Free], inside: &[usize], correlation: &Mat) -> Vec<
                 Term::Viscous,
                 Term::VelocityGain,
                 Term::EffortDelay,
+                Term::Compliance,
+                Term::GearDamping,
             ]) =>
             {
                 GroupKind::Lag

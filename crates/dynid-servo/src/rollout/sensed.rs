@@ -119,9 +119,10 @@ impl Run<'_> {
 
     /// Effort of a drive at an instant `past` the beginning of the last step; its slopes are left in `sensed.row`.
     fn drive_at(&mut self, j: usize, (at, past, h): (f64, f64, f64)) -> f64 {
-        let Run { rollout, p, joints, commands, slopes, wanted, sensed, before, .. } = self;
+        let Run { rollout, p, joints, commands, slopes, wanted, sensed, before, layout, .. } = self;
+        let (motor, at_sensor) = (layout.motor[j], layout.sensor[j]);
         let (joint, shaped, span) = (&joints[j], &commands[j], rollout.scheme.effort_span_s);
-        let mut told = wanted[j];
+        let mut told = wanted[motor];
         // A command that is shaped on its way has no jumps, and its mean over the step will do.
         let is_shaped = joint.rate.is_finite() || joint.smoothing > 0.0;
         let mut by_delay = 0.0;
@@ -140,18 +141,18 @@ impl Run<'_> {
             };
         }
         // State and slopes are those of the end of the step; back from there with its acceleration.
-        let (back, a) = (h - past, before[j]);
-        let v = self.v[j] - back * a;
-        let q = self.q[j] - back * (v + 0.5 * back * a);
+        let (back, a) = (h - past, before[at_sensor]);
+        let v = self.v[at_sensor] - back * a;
+        let q = self.q[at_sensor] - back * (v + 0.5 * back * a);
         let drive = joint.drive(told, q, v);
         let damping = drive.by_damping * joint.kd;
-        let own = j * *p..(j + 1) * *p;
+        let own = at_sensor * *p..(at_sensor + 1) * *p;
         let rows = (&slopes.q[own.clone()], &slopes.v[own.clone()], &slopes.accelerated[own.clone()]);
         for (c, to) in sensed.row.iter_mut().enumerate() {
             let (by_q, by_v, by_a) = (rows.0[c], rows.1[c], rows.2[c]);
             let by_v = by_v - back * by_a;
             let by_q = by_q - back * (by_v + 0.5 * back * by_a);
-            let by_told = if is_shaped { slopes.wanted[own.start + c] } else { 0.0 };
+            let by_told = if is_shaped { slopes.wanted[motor * *p + c] } else { 0.0 };
             *to = drive.by_error * (by_told - by_q) - damping * by_v;
         }
         rollout.by_drive(j, &drive, told.velocity - v, &mut sensed.row);

@@ -4,6 +4,7 @@
 
 mod arm;
 mod efforts;
+mod gears;
 mod golden;
 mod identification;
 mod motion;

@@ -51,6 +51,9 @@ fn log(seed: f64, rows: usize) -> String {
 }
 
 fn log_of(joints: Vec<ServoJoint>, seed: f64, rows: usize) -> String {
+    // A link that swings takes finer steps than rows.
+    let soft = joints.iter().any(|j| j.get(Term::Compliance) > 0.0);
+    let step_s = if soft { 0.000_31 } else { Scheme::default().step_s };
     let locked = vec![("finger".to_owned(), 0.0)];
     let options = RobotOptions { locked, ..RobotOptions::default() };
     let robot = Robot::parse(ARM, Path::new("arm.urdf"), &options).unwrap();
@@ -71,7 +74,7 @@ fn log_of(joints: Vec<ServoJoint>, seed: f64, rows: usize) -> String {
     let chains = Chain::all(&robot.mechanism);
     let step = std::f64::consts::TAU / 4096.0;
     let mut out = String::from("t,cmd_lift,cmd_elbow,q_lift,q_elbow\n");
-    Rollout::new(&chains[0], Scheme::default(), &[])
+    Rollout::new(&chains[0], Scheme { step_s, ..Scheme::default() }, &[])
         .run(&values, &log, |row| {
             let [a, b] = [0, 1].map(|j| (row.reading[j] / step).round() * step);
             let k = row.row;
@@ -641,7 +644,8 @@ fn a_robot_that_sags_below_what_its_command_keeps_is_told() {
     let breaks = &record.followed.as_ref().unwrap().breaks;
     let [broken] = &breaks[..] else { panic!("{breaks:?}") };
     assert!(broken.subject == "fore" && below > 0.005, "{broken:?} {below}");
-    assert!((broken.by_m - below).abs() < 1e-4, "{broken:?} {below}");
+    // The steps of the forecast are four times as long: over twelve seeds that is up to 0.16 % of how far the arm sags.
+    assert!((broken.by_m / below - 1.0).abs() < 4e-3, "{broken:?} {below}");
     assert_eq!(record.verdict.status, dynid::record::Outcome::Warn);
     assert!(record.verdict.headline.contains("for the command alone"), "{}", record.verdict.headline);
     assert!(record.verdict.warnings.iter().any(|w| w.contains("distance from a plane of fore")));
@@ -753,5 +757,101 @@ fn a_drive_that_clamps_its_commands_is_told_and_stated() {
         let config = config(&folder, &format!("{text}command_limits = {limits}\n"));
         let error = identify_servo(&config, &mut |_| {}).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
+    }
+}
+
+/// The lift's gear gives way: its links swing at 7 Hz on a motor that stands.
+fn soft() -> Vec<ServoJoint> {
+    let mut joints = truth();
+    joints[0] = joints[0].clone().with(Term::Compliance, 3e-3).with(Term::GearDamping, 0.6);
+    joints
+}
+
+#[test]
+fn a_gear_that_gives_way_goes_from_the_log_to_the_files_and_back() {
+    use dynid::simulate::{SimulateSettings, simulate_drives};
+    let folder = folder();
+    std::fs::write(folder.path().join("soft.csv"), log_of(soft(), 0.4, 2400)).unwrap();
+    let text = "robot = \"arm.urdf\"\n[[log]]\npath = \"soft.csv\"\n[servo]\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let asked = config(&folder, &format!("{text}find = [\"compliance\", \"gear_damping\"]\n"));
+    let found = identify_servo(&asked, &mut |_| {}).unwrap();
+    let files = found.files().unwrap();
+    let file = found.file(&asked, &files.notes);
+    assert!(file.fit.misfit.unwrap() < 1.1, "{:?}", file.fit);
+    let compliance = |joint: &str| {
+        let is = |p: &&dynid::servo::ServoParameterRecord| p.term == "compliance" && p.joints[0] == joint;
+        file.parameters.iter().find(is).unwrap()
+    };
+    let lift = compliance("lift");
+    assert_eq!(lift.verdict, ServoVerdict::Seen, "{lift:?}");
+    assert!((lift.value / 3e-3 - 1.0).abs() < 0.03, "{lift:?}");
+    // The elbow's is stiff, and is not told from one that is nearly so.
+    assert_ne!(compliance("elbow").verdict, ServoVerdict::Seen, "{:?}", compliance("elbow"));
+    assert!(compliance("elbow").value < 5e-4, "{:?}", compliance("elbow"));
+    let of = |name: &str| files.files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone()).unwrap();
+    let mjcf = of("arm.mujoco.xml");
+    assert!(mjcf.contains("<joint name=\"lift_gear\" type=\"hinge\""), "{mjcf}");
+    assert!(files.notes.iter().any(|n| n.contains("`<joint>_gear`")), "{:?}", files.notes);
+    let table: serde_json::Value = serde_json::from_str(&of("actuators.json")).unwrap();
+    let stiffness = table["joints"][0]["gear_stiffness"].as_f64().unwrap();
+    assert!((stiffness * lift.value - 1.0).abs() < 1e-12, "{stiffness}");
+    assert!(of("actuators.h").contains("dynid_compliance[DYNID_JOINTS]"));
+    let page = found.report(&file).unwrap();
+    assert!(page.contains("gears that give way: lift") && page.contains("stiffness of the gear"));
+
+    // The drives that were found move as the true ones do, behind a motion that was not recorded.
+    let json = folder.path().join("soft.json");
+    std::fs::write(&json, file.to_json()).unwrap();
+    let settings = SimulateSettings {
+        drives: Some(json),
+        duration_s: 4.0,
+        rate_hz: 200.0,
+        seed: 5,
+        encoder_bits: 0,
+        ..SimulateSettings::default()
+    };
+    let robot = folder.path().join("arm.urdf");
+    let made = simulate_drives(&robot, &Default::default(), None, &settings).unwrap();
+    let stiff = SimulateSettings { values: [("lift.compliance".to_owned(), 0.0)].into(), ..settings.clone() };
+    let stiff = simulate_drives(&robot, &Default::default(), None, &stiff).unwrap();
+    let mut exact =
+        ServoLog::new("exact", made.time.clone(), made.command.clone().unwrap(), made.position.clone());
+    exact.start = Some(made.command.as_ref().unwrap().iter().map(|c| c[0]).collect());
+    let options = RobotOptions { locked: vec![("finger".to_owned(), 0.0)], ..RobotOptions::default() };
+    let mechanism = Robot::parse(ARM, Path::new("arm.urdf"), &options).unwrap().mechanism;
+    let values = ServoValues { joints: soft(), inertias: mechanism.inertia_vector() };
+    let scheme = Scheme { step_s: 5e-4, ..Scheme::default() };
+    let (mut error, mut effect) = (0.0, 0.0);
+    Rollout::new(&Chain::all(&mechanism)[0], scheme, &[])
+        .run(&values, &exact, |row| {
+            error += (row.reading[0] - made.position[0][row.row]).powi(2);
+            effect += (row.reading[0] - stiff.position[0][row.row]).powi(2);
+        })
+        .unwrap();
+    assert!(error < 1e-3 * effect, "{error} of {effect}");
+}
+
+#[test]
+fn what_is_said_of_gears_takes_effect_or_is_refused() {
+    let folder = folder();
+    std::fs::write(folder.path().join("soft.csv"), log_of(soft(), 0.4, 1200)).unwrap();
+    let text = "robot = \"arm.urdf\"\n[[log]]\npath = \"soft.csv\"\n[servo]\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let misfit = |more: &str| {
+        let config = config(&folder, &format!("{text}{more}"));
+        identify_servo(&config, &mut |_| {}).map(|found| found.found.misfit)
+    };
+    let stiff = misfit("").unwrap();
+    let stated = misfit("gear_stiffness = { lift = 333.333 }\ngear_damping = { lift = 0.6 }\n").unwrap();
+    assert!(stated < 1.1 && stiff > 2.0 * stated, "{stiff} {stated}");
+    for (more, part) in [
+        ("gear_damping = { lift = 0.6 }\n", "servo.gear_damping.lift"),
+        ("backlash = { elbow = 0.01 }\ngear_stiffness = { lift = 300 }\n", "servo.backlash.elbow"),
+        ("encoder = \"link\"\n", "servo.encoder"),
+        ("find = [\"backlash\"]\n", "servo.find"),
+        ("gear_stiffness = { lift = 0 }\n", "servo.gear_stiffness"),
+        ("gear_stiffness = { wrist = 3 }\n", "wrist"),
+    ] {
+        let fault = misfit(more).unwrap_err().to_string();
+        assert!(fault.contains(part), "{more}: {fault}");
     }
 }

@@ -190,6 +190,12 @@ pub(super) fn complete(
         if joint.get(Term::Delay) <= 0.0 && !settings.known_delay {
             joint.set(Term::Delay, period);
         }
+        if settings.find.contains(&Term::Compliance) && joint.get(Term::Compliance) <= 0.0 {
+            let expected = format!(
+                "`compliance` beside a value to begin from: `\"{name}.compliance\" = ...` under [values], or `drives = \"servo.json\"` of a first log"
+            );
+            return Err(Error::setting("servo.find", &expected, "none"));
+        }
         if laws.contains(&Addition::Stiction) && joint.get(Term::Stiction) <= 0.0 {
             joint.set(Term::Stiction, PEAK * joint.get(Term::Coulomb));
             joint.set(Term::StribeckVelocity, STRIBECK);

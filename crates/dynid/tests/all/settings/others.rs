@@ -273,6 +273,9 @@ fn every_key_of_a_design_takes_effect_or_is_refused() {
             "servo.gains" | "servo.position_gain" => "",
             "servo.load" => "position_gain = 4000.0\nlaw = [\"load_friction\"]\n",
             "servo.limited" => "position_gain = 4000.0\nvelocity_gain = 100.0\neffort_limit = 15.0\n",
+            "servo.gear_damping" | "servo.backlash" | "servo.encoder" => {
+                "position_gain = 4000.0\ngear_stiffness = { j2 = 20000.0 }\n"
+            }
             _ => "position_gain = 4000.0\n",
         };
         let text = |more: &str, guesses: bool| Text {
@@ -466,6 +469,15 @@ half_space = { normal = [1, 0, 0], offset = 0.1 }",
             Refused("servo.body_error"),
         ),
         told("servo.find", "find = [\"smoothing_time\"]"),
+        table(
+            "servo.find",
+            "[servo]\nposition_gain = 4000.0\nfind = [\"compliance\"]",
+            Refused("a value to begin from"),
+        ),
+        told("servo.gear_stiffness", "gear_stiffness = { j2 = 2000.0 }"),
+        told("servo.gear_damping", "gear_damping = { j2 = 1.0 }"),
+        told("servo.backlash", "backlash = { j2 = 0.01 }"),
+        told("servo.encoder", "encoder = \"link\""),
         told("servo.load", "load = \"bodies\""),
         told("servo.step_s", "step_s = 0.001"),
         table("servo.blocks", "[servo]\nposition_gain = 4000.0\nblocks = 30", Refused("servo.blocks")),
@@ -742,6 +754,22 @@ fn every_key_of_drives_takes_effect_or_is_refused() {
             "[servo]\nbodies = \"found\"\nbody_error = 0.1",
         ),
         servo("servo.find", "[servo]\nfind = [\"dead_band\"]", Changes),
+        servo("servo.gear_stiffness", "[servo]\ngear_stiffness = { lift = 500.0 }", Changes),
+        beside(
+            "servo.gear_damping",
+            "[servo]\ngear_stiffness = { lift = 500.0 }",
+            "[servo]\ngear_stiffness = { lift = 500.0 }\ngear_damping = { lift = 0.5 }",
+        ),
+        beside(
+            "servo.backlash",
+            "[servo]\ngear_stiffness = { lift = 500.0 }",
+            "[servo]\ngear_stiffness = { lift = 500.0 }\nbacklash = { lift = 0.01 }",
+        ),
+        beside(
+            "servo.encoder",
+            "[servo]\ngear_stiffness = { lift = 5000.0 }",
+            "[servo]\ngear_stiffness = { lift = 5000.0 }\nencoder = \"link\"",
+        ),
         beside(
             "servo.load",
             "[servo]\nlaw = [\"load_friction\"]",

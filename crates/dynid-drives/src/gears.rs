@@ -1,0 +1,149 @@
+//! What is known of gears that give way, of the configuration, then of the robot file; what MJCF says of them.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use dynid_identify::Error;
+use dynid_identify::robot::Robot;
+use dynid_model::{AddedInertia, Dynamics, JointKind, LoadedState, Mechanism, Vec3};
+use dynid_robots::RobotFileError;
+use dynid_robots::mjcf::{self, GearJoint, JointParameters};
+use dynid_servo::{ServoJoint, Term};
+
+use super::config::{DriveConfig, EncoderName, FoundName};
+
+/// Stated numbers of gears, by joint.
+pub(crate) struct Gears {
+    stiffness: Vec<Option<f64>>,
+    damping: Vec<Option<f64>>,
+    backlash: Vec<Option<f64>>,
+}
+
+impl Gears {
+    /// Of the joints of a robot.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for numbers that no gear has, what is said of gears that are stiff, and joints that the robot file calls elastic without their stiffness.
+    pub(crate) fn of(config: &DriveConfig, robot: &Robot, names: &[String]) -> Result<Self, Error> {
+        let mut out = Gears {
+            stiffness: config.gear_stiffness.positive("servo.gear_stiffness", names)?,
+            damping: config.gear_damping.not_negative("servo.gear_damping", names)?,
+            backlash: config.backlash.not_negative("servo.backlash", names)?,
+        };
+        for elastic in &robot.elements.elastic {
+            let Some(j) = names.iter().position(|n| *n == elastic.joint) else { continue };
+            out.stiffness[j] = out.stiffness[j].or(elastic.k1);
+            out.damping[j] = out.damping[j].or(elastic.d);
+        }
+        let found = |term: FoundName| config.find.contains(&term);
+        let soft = |j: usize| out.stiffness[j].is_some() || found(FoundName::Compliance);
+        for elastic in &robot.elements.elastic {
+            let at = names.iter().position(|n| *n == elastic.joint);
+            if at.is_some_and(|j| !soft(j)) {
+                let key = format!("servo.gear_stiffness.{}", elastic.joint);
+                let expected = "a stiffness, `k1` in the robot file, or `find = [\"compliance\"]`, for the joint is elastic";
+                return Err(Error::setting(&key, expected, "none"));
+            }
+        }
+        let any = (0..names.len()).any(soft);
+        let expected =
+            "`gear_stiffness` beside it, or `find = [\"compliance\"]`: it acts on gears that give way";
+        for (key, stated) in [("gear_damping", &out.damping), ("backlash", &out.backlash)] {
+            if let Some(j) = (0..names.len()).find(|j| stated[*j].is_some_and(|x| x > 0.0) && !soft(*j)) {
+                return Err(Error::setting(&format!("servo.{key}.{}", names[j]), expected, "none"));
+            }
+        }
+        let idle = [
+            ("servo.encoder", config.encoder == EncoderName::Link),
+            ("servo.find", found(FoundName::GearDamping) || found(FoundName::Backlash)),
+        ];
+        match idle.into_iter().find(|(_, said)| *said && !any) {
+            Some((key, _)) => Err(Error::setting(key, expected, "none")),
+            None => Ok(out),
+        }
+    }
+
+    /// Sets what is stated of a joint, and returns the terms of it.
+    pub(crate) fn set(&self, joint: &mut ServoJoint, j: usize) -> BTreeSet<Term> {
+        let stated = [
+            (Term::Compliance, self.stiffness[j].map(|k| 1.0 / k)),
+            (Term::GearDamping, self.damping[j]),
+            (Term::Backlash, self.backlash[j]),
+        ];
+        let mut out = BTreeSet::new();
+        for (term, value) in stated {
+            if let Some(x) = value {
+                joint.set(term, x);
+                out.insert(term);
+            }
+        }
+        out
+    }
+}
+
+/// The gear of a joint as MJCF has it, if it gives way; a motor without a rotor would have no inertia there.
+pub(crate) fn gear(joint: &ServoJoint, mobility: f64) -> Option<GearJoint> {
+    let compliance = joint.get(Term::Compliance);
+    (compliance > 0.0 && joint.get(Term::RotorInertia) > 0.0).then(|| GearJoint {
+        stiffness: 1.0 / compliance,
+        damping: joint.get(Term::GearDamping),
+        backlash: joint.get(Term::Backlash),
+        mobility,
+    })
+}
+
+/// Joints whose gears know the mobility that they have in the model that `write` makes of stiff ones.
+pub(crate) fn placed(
+    mut joints: Vec<JointParameters>,
+    write: impl Fn(&[JointParameters]) -> Result<String, RobotFileError>,
+    path: &Path,
+) -> Result<Vec<JointParameters>, Error> {
+    if joints.iter().all(|j| j.gear.is_none_or(|g| g.backlash == 0.0)) {
+        return Ok(joints);
+    }
+    let stiff: Vec<JointParameters> =
+        joints.iter().map(|j| JointParameters { gear: None, ..j.clone() }).collect();
+    let robot = mjcf::parse(&write(&stiff)?, path)?;
+    let named = |source| Error::Mechanism { file: path.display().to_string(), source };
+    let mechanism = robot.file.description.build().map_err(named)?;
+    let mobility: Vec<f64> = joints.iter().map(|j| mobility(&mechanism, &joints, &j.joint)).collect();
+    for (joint, mobility) in joints.iter_mut().zip(mobility) {
+        joint.gear.iter_mut().for_each(|gear| gear.mobility = mobility);
+    }
+    Ok(joints)
+}
+
+/// Acceleration of the link of a gear that gives way against its motor per effort between them, all other joints and gears free, at zero.
+fn mobility(mechanism: &Mechanism, joints: &[JointParameters], joint: &str) -> f64 {
+    let dynamics = Dynamics::new(mechanism);
+    let n = mechanism.joint_rates();
+    let mut q = Vec::with_capacity(mechanism.joint_positions());
+    let mut rotors = vec![0.0; n];
+    let mut own = None;
+    for body in mechanism.bodies() {
+        match body.joint.kind {
+            JointKind::Floating => q.extend([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            _ => q.extend(std::iter::repeat_n(0.0, body.joint.positions())),
+        }
+        if let Some(p) = joints.iter().find(|p| p.joint == body.joint.name) {
+            // The rotor of a gear that gives way is on its other side.
+            rotors[body.rate] = if p.gear.is_none() { p.armature } else { 0.0 };
+            if p.joint == joint {
+                own = Some((body.rate, p.armature));
+            }
+        }
+    }
+    let Some((own, rotor)) = own else { return f64::NAN };
+    let effort: Vec<f64> = (0..n).map(|k| if k == own { 1.0 } else { 0.0 }).collect();
+    let (still, mut ddq) = (vec![0.0; n], vec![0.0; n]);
+    let state = LoadedState { q: &q, dq: &still, effort: &effort, gravity: Some(Vec3::zero()) };
+    let mut work = dynamics.forward_workspace();
+    let solved = dynamics.forward_dynamics(
+        &state,
+        &mechanism.inertia_vector(),
+        AddedInertia::Diagonal(&rotors),
+        &mut work,
+        &mut ddq,
+    );
+    solved.map_or(f64::NAN, |()| ddq[own] + 1.0 / rotor)
+}
