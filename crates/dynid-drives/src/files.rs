@@ -8,7 +8,7 @@ use dynid_files::FileMember;
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
 use dynid_model::Inertia;
-use dynid_robots::mjcf::{self, JointParameters};
+use dynid_robots::mjcf::{self, JointParameters, PositionActuator};
 use dynid_robots::robot;
 use dynid_robots::urdf::{self, JointDynamics};
 use dynid_servo::identify::EffortUse;
@@ -40,6 +40,14 @@ pub fn stated(robot: &Robot) -> Result<Vec<JointParameters>, Error> {
         ..JointParameters::default()
     };
     Ok(urdf::dynamics(text, file)?.into_iter().map(of).collect())
+}
+
+/// Position loops that the robot file states.
+pub(super) fn position_actuators(robot: &Robot) -> Result<Vec<PositionActuator>, Error> {
+    match (&robot.file.xml, &robot.file.mjcf) {
+        (Some(text), Some(_)) => Ok(mjcf::parse(text, FileMember::of(&robot.path).path)?.position_actuators),
+        _ => Ok(Vec::new()),
+    }
 }
 
 impl ServoFiles {

@@ -195,7 +195,7 @@ pub fn identify_servo(
     if !still.is_empty() {
         let names: Vec<&str> = still.iter().map(|(n, _)| n.as_str()).collect();
         warnings.push(format!("no columns, held at 0: {}; `lock` states another position", names.join(", ")));
-        robot = robot.locked(&still)?;
+        robot = without_motors(robot.locked(&still)?);
         training = read(&config.log, &robot)?;
     }
     let validation = read(&config.validation, &robot)?;
@@ -223,7 +223,7 @@ pub fn identify_servo(
     let settings = config.servo.settings(&robot, period)?;
     refuse_idle(config, &logs)?;
     progress(ServoStep::Fit);
-    warnings.extend(beyond_limits(&robot, &logs, &settings));
+    warnings.extend(beyond_limits(&robot, &logs, &settings)?);
     let found = identify(&robot.mechanism, &logs, &settings).map_err(ServoFault::from)?;
     let rms = |values: &ServoValues, logs: &[ServoLog]| -> Option<Vec<Vec<f64>>> {
         let whole = blocks(logs, logs.len());
@@ -256,12 +256,14 @@ pub fn identify_servo(
 /// Share of the rows in which a command must lie beyond the limits of its joint, and share of their range by which positions may.
 const BEYOND: f64 = 0.01;
 
-/// Joints whose commands leave the limits of the robot file while their positions do not, in words: drives often clamp what they are told.
-fn beyond_limits(robot: &Robot, logs: &[ServoLog], settings: &ServoSettings) -> Vec<String> {
+/// Joints whose commands leave the limits of the robot file, those of their actuators or else their own, while their positions do not, in words: drives often clamp what they are told.
+fn beyond_limits(robot: &Robot, logs: &[ServoLog], settings: &ServoSettings) -> Result<Vec<String>, Error> {
     let (names, owners) = (robot.rate_names(), robot.mechanism.rate_bodies());
+    let actuators = files::position_actuators(robot)?;
     let mut out = Vec::new();
     for (j, (name, joint)) in names.iter().zip(&settings.joints).enumerate() {
-        let limits = robot.mechanism.bodies()[owners[j]].joint.limits.position;
+        let of_actuator = actuators.iter().find(|a| a.joint == *name).and_then(|a| a.command_limits);
+        let limits = of_actuator.or(robot.mechanism.bodies()[owners[j]].joint.limits.position);
         let free = |(low, high): &(f64, f64)| low < high && joint.command_limits.0 == f64::NEG_INFINITY;
         let Some((low, high)) = limits.filter(free) else { continue };
         let margin = BEYOND * (high - low);
@@ -283,7 +285,7 @@ fn beyond_limits(robot: &Robot, logs: &[ServoLog], settings: &ServoSettings) -> 
             ));
         }
     }
-    out
+    Ok(out)
 }
 
 /// Logs need not all measure efforts or currents that the run states columns for; that none does is a fault. Returns what to say of the others.
@@ -373,7 +375,7 @@ pub fn clamped(
         ));
         options.locked.extend(floating.into_iter().map(|name| (name, 0.0)));
     }
-    let robot = if options.locked.is_empty() { plain } else { Robot::load(file, &options)? };
+    let robot = without_motors(if options.locked.is_empty() { plain } else { Robot::load(file, &options)? });
     refuse_loops(&robot, "identified from commands and positions")?;
     let of_robot = |joint: &String| robot.rate_names().contains(joint);
     let is_spring = |element: &String| ["spring", "balancer"].contains(&element.as_str());
@@ -400,14 +402,38 @@ pub fn clamped(
     Ok((robot, warnings))
 }
 
-/// Numbers as the robot file states them, where all position gains are known.
+/// Of a joint that is elastic one position is logged: that of its encoder, on whichever side.
+fn without_motors(mut robot: Robot) -> Robot {
+    robot.axes.retain(|a| !a.motor);
+    robot
+}
+
+/// Numbers as the robot file states them, where all position gains are known or stated there: by the position loops of an MJCF.
 fn file_values(robot: &Robot, settings: &ServoSettings) -> Result<Option<ServoValues>, Error> {
-    if settings.known_gain.iter().any(|k| !k) {
+    let names = robot.rate_names();
+    let place = |name: &String| names.iter().position(|n| n == name);
+    let (mut joints, mut known) = (settings.joints.clone(), settings.known_gain.clone());
+    for actuator in files::position_actuators(robot)? {
+        let Some(j) = place(&actuator.joint).filter(|j| !known[*j]) else { continue };
+        known[j] = true;
+        let joint = &mut joints[j];
+        joint.set(Term::PositionGain, actuator.position_gain);
+        joint.set(Term::Offset, -actuator.offset);
+        if !settings.known_damping[j] {
+            joint.set(Term::VelocityGain, actuator.velocity_gain);
+        }
+        if let Some(limit) = actuator.effort_limit.filter(|_| joint.get(Term::EffortLimit).is_infinite()) {
+            joint.set(Term::EffortLimit, limit);
+        }
+        if let Some(limits) = actuator.command_limits.filter(|_| joint.command_limits.0.is_infinite()) {
+            joint.command_limits = limits;
+        }
+    }
+    if known.iter().any(|k| !k) {
         return Ok(None);
     }
-    let mut joints = settings.joints.clone();
     for stated in files::stated(robot)? {
-        let Some(j) = robot.rate_names().iter().position(|n| *n == stated.joint) else { continue };
+        let Some(j) = place(&stated.joint) else { continue };
         joints[j].set(Term::Viscous, stated.damping);
         joints[j].set(Term::Coulomb, stated.friction_loss);
         joints[j].set(Term::RotorInertia, stated.armature);

@@ -68,6 +68,10 @@ pub(crate) struct Layout {
     pub(crate) sensor: Vec<usize>,
     /// Per coordinate, its joint.
     pub(crate) joint: Vec<usize>,
+    /// Per coordinate, whether a drive moves it: else a gear does.
+    pub(crate) driven: Vec<bool>,
+    /// Per coordinate, the one that its drive reads; of links that no drive moves their own.
+    pub(crate) reads: Vec<usize>,
     /// Gears that give way.
     pub(crate) gears: Vec<Gear>,
 }
@@ -77,8 +81,15 @@ impl Layout {
     pub(crate) fn new(joints: &[usize], values: &ServoValues) -> Self {
         let links = joints.len();
         let own: Vec<usize> = (0..links).collect();
-        let mut out =
-            Layout { links, motor: own.clone(), sensor: own.clone(), joint: own, gears: Vec::new() };
+        let mut out = Layout {
+            links,
+            motor: own.clone(),
+            sensor: own.clone(),
+            driven: vec![true; links],
+            reads: own.clone(),
+            joint: own,
+            gears: Vec::new(),
+        };
         for (j, robot) in joints.iter().enumerate() {
             let of = &values.joints[*robot];
             let compliance = of.get(Term::Compliance);
@@ -86,11 +97,13 @@ impl Layout {
                 continue;
             }
             let motor = links + out.gears.len();
-            out.motor[j] = motor;
+            (out.motor[j], out.driven[j]) = (motor, false);
             if of.encoder == EncoderAt::Motor {
                 out.sensor[j] = motor;
             }
             out.joint.push(j);
+            out.driven.push(true);
+            out.reads.push(out.sensor[j]);
             let (damping, play) = (of.get(Term::GearDamping), 0.5 * of.get(Term::Backlash));
             out.gears.push(Gear { link: j, motor, stiffness: 1.0 / compliance, damping, play });
         }
@@ -102,19 +115,14 @@ impl Layout {
         self.joint.len()
     }
 
-    /// Whether a drive moves the coordinate: else a gear does.
-    pub(crate) fn is_driven(&self, coordinate: usize) -> bool {
-        self.motor[self.joint[coordinate]] == coordinate
-    }
-
-    /// The coordinate that the drive of a coordinate reads.
-    pub(crate) fn reads(&self, coordinate: usize) -> usize {
-        self.sensor[self.joint[coordinate]]
+    /// Whether every drive reads what it moves.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        self.sensor == self.motor
     }
 
     /// Per coordinate the numbers of what moves it: of a drive, or none.
     pub(crate) fn numbers(&self, joints: &[Numbers]) -> Vec<Numbers> {
-        let of = |c: usize| match self.is_driven(c) {
+        let of = |c: usize| match self.driven[c] {
             true if c >= self.links => {
                 let own = joints[self.joint[c]];
                 Numbers { rotor: own.rotor.max(LEAST_ROTOR), ..own }

@@ -308,7 +308,7 @@ impl<'a> Run<'a> {
             joints,
             commands: chain.joints.iter().map(shaped).collect(),
             equation: Equation::new(chain, &values.inertias),
-            solver: Solver::new(m, rollout.scheme),
+            solver: Solver::new(&layout, rollout.scheme),
             wanted: vec![Wanted::default(); m],
             q: vec![0.0; m],
             v: vec![0.0; m],
@@ -595,7 +595,7 @@ impl<'a> Run<'a> {
             let at = solver.drive[j];
             let mean = mean_of(j);
             let begin = self.v[j];
-            let (link, driven, reads) = (layout.joint[j], layout.is_driven(j), layout.reads(j));
+            let (link, driven, reads) = (layout.joint[j], layout.driven[j], layout.reads[j]);
             // Bodies are those of links.
             let bodies = if j < n { n } else { 0 };
             let sign = solver.by_level(joint, j, begin);

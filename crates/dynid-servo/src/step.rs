@@ -216,7 +216,8 @@ impl Begin<'_> {
 }
 
 impl Solver {
-    pub(crate) fn new(n: usize, scheme: Scheme) -> Self {
+    pub(crate) fn new(layout: &Layout, scheme: Scheme) -> Self {
+        let n = layout.len();
         Solver {
             n,
             scheme,
@@ -232,7 +233,7 @@ impl Solver {
             beside: vec![0.0; n],
             change: vec![0.0; n],
             turning: vec![0.0; n],
-            tangent: Tangent::new(n),
+            tangent: Tangent::new(n, layout.is_symmetric()),
         }
     }
 
@@ -246,16 +247,17 @@ impl Solver {
             let mut inertial = joint.rotor * (self.next[j] - b.v[j]);
             let mut bias = 0.0;
             if j < links {
-                for k in 0..links {
-                    inertial += b.mass[j * links + k] * (self.next[k] - b.v[k]);
+                let row = &b.mass[j * links..][..links];
+                for (k, mass) in row.iter().enumerate() {
+                    inertial += mass * (self.next[k] - b.v[k]);
                 }
                 bias = b.bias[j];
             }
-            let reads = b.layout.reads(j);
-            let read = mean(&self.next, reads);
+            let reads = b.layout.reads[j];
+            let own = mean(&self.next, j);
+            let read = if reads == j { own } else { mean(&self.next, reads) };
             let drive = joint.drive(b.wanted[j], middle(read, reads), read);
-            let viscous = joint.viscous * mean(&self.next, j);
-            self.residual[j] = inertial / b.h + bias - drive.effort + viscous + joint.offset;
+            self.residual[j] = inertial / b.h + bias - drive.effort + joint.viscous * own + joint.offset;
             let by_read = 0.25 * b.h * drive.by_error + 0.5 * drive.by_damping * joint.kd;
             (self.slope[j], self.beside[j]) = if reads == j { (by_read, 0.0) } else { (0.0, by_read) };
             self.slope[j] += 0.5 * joint.viscous;
@@ -362,7 +364,7 @@ impl Solver {
             self.carried[j] = match self.scheme.load {
                 LoadOf::Bodies => b.bias[b.layout.joint[j]],
                 LoadOf::Drive => {
-                    let c = b.layout.reads(j);
+                    let c = b.layout.reads[j];
                     let (q, v) =
                         if self.scheme.middle { (b.ahead.0[c], b.ahead.1[c]) } else { (b.q[c], b.v[c]) };
                     self.before[j] = b.joints[j].drive(b.wanted[j], q, v);
@@ -407,7 +409,7 @@ impl Solver {
         for j in 0..self.n {
             let v = b.v[j];
             // A link behind a gear that gives way has no friction: it never sticks.
-            self.side[j] = if v > 0.0 || !b.layout.is_driven(j) {
+            self.side[j] = if v > 0.0 || !b.layout.driven[j] {
                 1.0
             } else if v < 0.0 {
                 -1.0
@@ -433,7 +435,7 @@ impl Solver {
             let one_by_one = round >= FREE_ROUNDS;
             let mut turned = false;
             for j in 0..self.n {
-                let against = self.next[j] * self.side[j] < 0.0 && b.layout.is_driven(j);
+                let against = self.next[j] * self.side[j] < 0.0 && b.layout.driven[j];
                 if against && !(turned && one_by_one) {
                     if self.turns(j, b.v[j]) {
                         // It does not turn after all.
@@ -499,7 +501,9 @@ impl Solver {
         tangent.fill_inertia(b, &self.side);
         for j in 0..self.n {
             tangent.add(j, j, self.slope[j], &self.side);
-            tangent.add(j, b.layout.reads(j), self.beside[j], &self.side);
+            if self.beside[j] != 0.0 {
+                tangent.add(j, b.layout.reads[j], self.beside[j], &self.side);
+            }
         }
         for (gear, carried) in b.layout.gears.iter().zip(&self.gears) {
             let slope = 0.25 * b.h * carried.by_lead + 0.5 * carried.by_rate;
@@ -516,28 +520,38 @@ impl Solver {
     }
 }
 
-/// `(M + I_a)/h` and slopes of efforts, factored as `L U` without pivoting: the inertia leads, rows of joints that stick are those of the
-/// identity.
+/// `(M + I_a)/h` and slopes of efforts, factored without pivoting: the inertia leads, rows of joints that stick are those of the identity. As `L D Lᵀ`, of which
+/// the lower triangle is used alone, unless a drive reads another coordinate than its own: then as `L U`.
 #[derive(Debug)]
 pub(crate) struct Tangent {
     n: usize,
-    /// Row-major; factored, `L` with ones on its diagonal below that of `U`.
+    symmetric: bool,
+    /// Row-major.
     entries: Vec<f64>,
 }
 
 impl Tangent {
-    fn new(n: usize) -> Self {
-        Tangent { n, entries: vec![0.0; n * n] }
+    fn new(n: usize, symmetric: bool) -> Self {
+        Tangent { n, symmetric, entries: vec![0.0; n * n] }
     }
 
     fn fill_inertia(&mut self, b: &Begin<'_>, side: &[f64]) {
-        let n = self.n;
-        for j in 0..n {
-            for k in 0..n {
-                let moves = side[j] != 0.0 && side[k] != 0.0;
-                let still = if j == k { 1.0 } else { 0.0 };
-                self.entries[j * n + k] = if moves { b.inertia(j, k) / b.h } else { still };
+        let (n, links) = (self.n, b.layout.links);
+        for (j, row) in self.entries.chunks_exact_mut(n).enumerate() {
+            row.fill(0.0);
+            if side[j] == 0.0 {
+                row[j] = 1.0;
+                continue;
             }
+            if j < links {
+                let most = if self.symmetric { j + 1 } else { links };
+                for (k, to) in row[..most].iter_mut().enumerate() {
+                    if side[k] != 0.0 {
+                        *to = b.mass[j * links + k] / b.h;
+                    }
+                }
+            }
+            row[j] += b.joints[j].rotor / b.h;
         }
     }
 
@@ -550,36 +564,57 @@ impl Tangent {
 
     fn factor(&mut self) {
         let n = self.n;
-        for k in 0..n {
-            let (above, below) = self.entries.split_at_mut((k + 1) * n);
-            let pivot_row = &above[k * n + k..];
-            for row in below.chunks_exact_mut(n) {
-                if row[k] != 0.0 {
+        if !self.symmetric {
+            for k in 0..n {
+                let (above, below) = self.entries.split_at_mut((k + 1) * n);
+                let pivot_row = &above[k * n + k..];
+                for row in below.chunks_exact_mut(n) {
                     row[k] /= pivot_row[0];
                     let factor = row[k];
                     subtract(&mut row[k + 1..], factor, &pivot_row[1..]);
                 }
             }
+            return;
+        }
+        for j in 0..n {
+            for k in 0..j {
+                let mut sum = self.entries[j * n + k];
+                for i in 0..k {
+                    sum -= self.entries[j * n + i] * self.entries[k * n + i] * self.entries[i * n + i];
+                }
+                self.entries[j * n + k] = sum / self.entries[k * n + k];
+            }
+            let mut pivot = self.entries[j * n + j];
+            for i in 0..j {
+                pivot -= self.entries[j * n + i] * self.entries[j * n + i] * self.entries[i * n + i];
+            }
+            self.entries[j * n + j] = pivot;
         }
     }
 
     /// Solves for `columns` right-hand sides, row-major, in place.
     pub(crate) fn solve(&self, rhs: &mut [f64], columns: usize) {
-        let n = self.n;
+        let (n, entries) = (self.n, &self.entries);
         for j in 0..n {
             let (above, own) = rhs.split_at_mut(j * columns);
             let own = &mut own[..columns];
             for k in 0..j {
-                subtract(own, self.entries[j * n + k], &above[k * columns..][..columns]);
+                subtract(own, entries[j * n + k], &above[k * columns..][..columns]);
             }
         }
         for j in (0..n).rev() {
             let (own, below) = rhs[j * columns..].split_at_mut(columns);
-            for k in j + 1..n {
-                subtract(own, self.entries[j * n + k], &below[(k - j - 1) * columns..][..columns]);
+            let pivot = 1.0 / entries[j * n + j];
+            if self.symmetric {
+                own.iter_mut().for_each(|x| *x *= pivot);
             }
-            let pivot = 1.0 / self.entries[j * n + j];
-            own.iter_mut().for_each(|x| *x *= pivot);
+            for k in j + 1..n {
+                let entry = if self.symmetric { entries[k * n + j] } else { entries[j * n + k] };
+                subtract(own, entry, &below[(k - j - 1) * columns..][..columns]);
+            }
+            if !self.symmetric {
+                own.iter_mut().for_each(|x| *x *= pivot);
+            }
         }
     }
 }

@@ -2,17 +2,17 @@
 
 use dynid_files::excerpt::closest;
 
-use super::NO_LIMIT;
 use super::defaults::{ACTUATORS, Defaults};
 use super::document::Document;
 use super::fields::Fields;
-use super::joint::limit;
+use super::joint::{limit, pair};
 use super::model::Model;
+use super::{NO_LIMIT, PositionActuator};
 use crate::robot_error::RobotFileError;
 use crate::robot_numbers::LEAST_LIMIT;
 
-/// Puts what actuators say of joints into a model. Their gains, delays and controllers belong to the drive and are passed over: efforts of
-/// logs are what they make.
+/// Puts what actuators say of joints into a model. Their gains, delays and controllers belong to the drive: efforts of logs are what
+/// they make, and position loops are kept beside for fits of drives.
 pub(super) fn read<'a>(
     document: &'a Document,
     defaults: &Defaults<'a>,
@@ -56,6 +56,42 @@ pub(super) fn read<'a>(
         if !model.driven.contains(&joint.name) {
             model.driven.push(joint.name.clone());
         }
+        if let Some((position_gain, velocity_gain, offset)) = position_loop(&fields, &element.name)?
+            && gear == 1.0
+        {
+            let clamps = fields.flag("ctrllimited")?.unwrap_or(true);
+            model.position_actuators.push(PositionActuator {
+                joint: name.to_owned(),
+                position_gain,
+                velocity_gain,
+                offset,
+                effort_limit: force,
+                command_limits: pair(&fields, "ctrlrange")?.filter(|_| clamps),
+            });
+        }
     }
     Ok(())
+}
+
+/// Position gain, velocity gain and constant force of an actuator that closes a position loop without a lag of its own.
+fn position_loop(fields: &Fields<'_>, kind: &str) -> Result<Option<(f64, f64, f64)>, RobotFileError> {
+    match kind {
+        // Damping by a ratio hangs on the inertia of all that moves.
+        "position" if fields.number("dampratio", 0.0)? == 0.0 && fields.number("timeconst", 0.0)? == 0.0 => {
+            Ok(Some((fields.number("kp", 1.0)?, fields.number("kv", 0.0)?, 0.0)))
+        }
+        "general" => {
+            let plain = |key: &str, usual: &str| fields.text(key).unwrap_or(usual) == usual;
+            let affine = fields.text("biastype") == Some("affine");
+            if !affine || !plain("gaintype", "fixed") || !plain("dyntype", "none") {
+                return Ok(None);
+            }
+            let [gain, ..] = fields.filled("gainprm", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
+            let [offset, by_position, by_velocity, ..] =
+                fields.filled("biasprm", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
+            let closes = gain > 0.0 && by_position == -gain && by_velocity <= 0.0;
+            Ok(closes.then_some((gain, -by_velocity, offset)))
+        }
+        _ => Ok(None),
+    }
 }

@@ -60,6 +60,23 @@ pub struct JointParameters {
     pub gear: Option<GearJoint>,
 }
 
+/// A position loop that MJCF states as an actuator of a joint: `force = position_gain (ctrl - q) - velocity_gain q̇ + offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PositionActuator {
+    /// Joint.
+    pub joint: String,
+    /// `kp`, N m/rad or N/m.
+    pub position_gain: f64,
+    /// `kv`, N m s/rad or N s/m.
+    pub velocity_gain: f64,
+    /// Constant force, N m or N.
+    pub offset: f64,
+    /// Largest force, if it is limited.
+    pub effort_limit: Option<f64>,
+    /// Controls that it takes, if it clamps them.
+    pub command_limits: Option<(f64, f64)>,
+}
+
 /// Dry friction as hard as MuJoCo has it, for joints that do not say how hard theirs is: a time constant below two steps of the simulation is taken for two.
 const STICKING: [(&str, &str); 2] =
     [("solreffriction", "0.0004 1"), ("solimpfriction", "0.9999 0.9999 0.001")];

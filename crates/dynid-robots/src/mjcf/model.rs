@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use dynid_model::closed::ClosureDescription;
 use dynid_model::{Description, Inertia, LinkDescription, Placement, Vec3};
 
-use super::JointParameters;
 use super::document::Element;
+use super::{JointParameters, PositionActuator};
 use crate::ElementSpec;
 
 /// Name of the body that every MJCF has.
@@ -65,6 +65,8 @@ pub(super) struct Model<'a> {
     pub(super) closures: Vec<ClosureDescription>,
     /// Joints that actuators drive, in the order of the actuators.
     pub(super) driven: Vec<String>,
+    /// Position loops that actuators close.
+    pub(super) position_actuators: Vec<PositionActuator>,
     pub(super) home: Vec<(String, Vec<f64>)>,
     /// What a user should know.
     pub(super) warnings: Vec<String>,
@@ -90,6 +92,7 @@ impl Model<'_> {
             sites: HashMap::new(),
             closures: Vec::new(),
             driven: Vec::new(),
+            position_actuators: Vec::new(),
             home: Vec::new(),
             warnings: Vec::new(),
         }

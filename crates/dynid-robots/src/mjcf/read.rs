@@ -5,7 +5,6 @@ use std::path::Path;
 use dynid_files::digest::SourceFile;
 use dynid_model::Description;
 
-use super::JointParameters;
 use super::actuator;
 use super::compiler::{Compiler, Options};
 use super::defaults::Defaults;
@@ -15,6 +14,7 @@ use super::mesh::Meshes;
 use super::model::Model;
 use super::parts::Parts;
 use super::walk::{Count, Walk};
+use super::{JointParameters, PositionActuator};
 use crate::robot_error::RobotFileError;
 use crate::toml_robot::RobotFile;
 
@@ -26,6 +26,8 @@ pub struct MjcfRobot {
     pub description: Description,
     /// What the moving joints state besides, in the order of the file.
     pub joints: Vec<JointParameters>,
+    /// Position loops that actuators close: `<position>` and `<general>` that says the same, of gear 1.
+    pub position_actuators: Vec<PositionActuator>,
     /// The robot with what it says of elements, loops and sources.
     pub file: RobotFile,
 }
@@ -62,6 +64,7 @@ pub fn parse_edited(text: &str, path: &Path, changed: &[EditedFile]) -> Result<M
     let sources = [document.sources.clone(), meshes].concat();
     Ok(MjcfRobot {
         joints: model.joints.into_iter().map(|j| j.parameters).collect(),
+        position_actuators: model.position_actuators,
         file: RobotFile {
             actuated: (!model.closures.is_empty() && !model.driven.is_empty()).then_some(model.driven),
             home: model.home,

@@ -317,3 +317,21 @@ fn the_outermost_element_tells_the_kind_of_file() {
     let error = robot::parse("<kml/>", "a.xml").unwrap_err();
     assert!(error.to_string().contains("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>"), "{error}");
 }
+
+#[test]
+fn position_loops_of_actuators_are_kept() {
+    let text = "<mujoco><default><position kp='40' kv='1.5'/><default class='weak'><position kp='10'/></default></default>
+      <worldbody><body><joint name='a'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
+      <body><joint name='b'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
+      <body><joint name='c'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
+      <body><joint name='d'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></body></body></body></worldbody>
+      <actuator><position joint='a' class='weak' ctrlrange='-1 1.5' forcerange='-6 6'/>
+      <general joint='b' biastype='affine' gainprm='20' biasprm='0.5 -20 -2'/>
+      <motor joint='c' ctrlrange='-3 3'/><position joint='d' gear='2'/></actuator></mujoco>";
+    let found = mjcf::parse(text, "m.xml").unwrap().position_actuators;
+    let [a, b] = &found[..] else { panic!("{found:?}") };
+    assert_eq!((a.joint.as_str(), a.position_gain, a.velocity_gain, a.offset), ("a", 10.0, 1.5, 0.0));
+    assert_eq!((a.command_limits, a.effort_limit), (Some((-1.0, 1.5)), Some(6.0)));
+    assert_eq!((b.joint.as_str(), b.position_gain, b.velocity_gain, b.offset), ("b", 20.0, 2.0, 0.5));
+    assert_eq!((b.command_limits, b.effort_limit), (None, None));
+}

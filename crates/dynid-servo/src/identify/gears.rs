@@ -32,7 +32,7 @@ const BACKLASHES: [f64; 2] = [1e-3, 8e-3];
 const VALLEYS: usize = 3;
 
 /// Rounds per joint at most.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 
 /// Time constants of a link on its gear until the beginning of a rollout is forgotten, and the share of a log that may go by until then.
 const FORGOTTEN: f64 = 3.0;
@@ -90,7 +90,7 @@ struct Found {
 impl Work<'_> {
     /// Finds gears that give way, in rounds: of every joint the frequency at which its link swings is looked for over all that the rows can show, with all other numbers
     /// as they are, and fitted with the joint's own friction and rotor from the best ones. The joint that gains most is taken, and all numbers are fitted, until none gains.
-    /// Then all others are left free too: a gear that is taken for stiff would make those about it softer than they are.
+    /// Then the others are taken too, one by one: a gear that counts for stiff would make those about it softer than they are.
     pub(super) fn find_gears(
         &mut self,
         laws: &BTreeSet<Addition>,
@@ -110,8 +110,9 @@ impl Work<'_> {
             let compliance = values.joints[c.joint].get(Term::Compliance);
             values = c.begin(&values, compliance, BACKLASHES[0]);
         }
-        let mut all = false;
-        for _ in 0..ROUNDS * candidates.len() + 1 {
+        // Gears that would make the simulation get lost stay as they are.
+        let mut left = taken.clone();
+        for _ in 0..ROUNDS * candidates.len() {
             self.forget_starts(&values);
             let evaluation = Evaluation::new(&self.problem(&[], self.scheme), &values, sigma, false)?;
             let own: Vec<f64> =
@@ -121,27 +122,23 @@ impl Work<'_> {
                 candidates.par_iter().map(|c| self.find_gear(c, &values, &own)).collect();
             self.evaluations += found.iter().flatten().map(|f| f.evaluations).sum::<usize>();
             let loss = |k: usize| found[k].as_ref().map_or(f64::INFINITY, |f| f.loss);
-            let best = (0..candidates.len()).min_by(|a, b| loss(*a).total_cmp(&loss(*b)));
-            if let Some(best) = best.filter(|k| loss(*k) < (1.0 - LEAST_ELASTIC_GAIN) * without)
-                && let Some(of_best) = &found[best]
-                && self.take(&candidates, best, &mut taken, laws, (&of_best.values, &mut values))
-            {
-                continue;
-            }
-            if all {
+            let best = |of: &dyn Fn(usize) -> bool| {
+                (0..candidates.len()).filter(|k| of(*k)).min_by(|a, b| loss(*a).total_cmp(&loss(*b)))
+            };
+            let gains = |k: usize| loss(k) < (1.0 - LEAST_ELASTIC_GAIN) * without;
+            let Some(next) = best(&|k| gains(k) && (taken[k] || !left[k])).or_else(|| best(&|k| !left[k]))
+            else {
                 break;
-            }
-            all = true;
-            for k in 0..candidates.len() {
-                let c = &candidates[k];
-                let stiffest = c.begin(&values, c.starts[0], BACKLASHES[0]);
-                for start in found[k].iter().map(|f| &f.values).chain([&stiffest]) {
-                    let mut with = values.clone();
-                    with.joints[c.joint] = start.joints[c.joint].clone();
-                    if !taken[k] {
-                        self.take(&candidates, k, &mut taken, laws, (&with, &mut values));
-                    }
-                }
+            };
+            left[next] = true;
+            let c = &candidates[next];
+            let stiffest = c.begin(&values, c.starts[0], BACKLASHES[0]);
+            let starts = found[next].iter().map(|f| &f.values);
+            let more = starts
+                .chain(Some(&stiffest).filter(|_| !taken[next]))
+                .any(|start| self.take(&candidates, next, &mut taken, laws, (start, &mut values)));
+            if !more && taken[next] {
+                break;
             }
         }
         self.forget_starts(&values);

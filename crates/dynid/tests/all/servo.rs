@@ -843,6 +843,18 @@ fn what_is_said_of_gears_takes_effect_or_is_refused() {
     let stiff = misfit("").unwrap();
     let stated = misfit("gear_stiffness = { lift = 333.333 }\ngear_damping = { lift = 0.6 }\n").unwrap();
     assert!(stated < 1.1 && stiff > 2.0 * stated, "{stiff} {stated}");
+    // The robot file may say the same.
+    let elastic = |numbers: &str| {
+        let robot = format!("urdf = \"arm.urdf\"\n[element.lift]\nelastic = {{ ratio = 100{numbers} }}\n");
+        std::fs::write(folder.path().join("soft.toml"), robot).unwrap();
+        let config = config(&folder, &text.replace("arm.urdf", "soft.toml"));
+        identify_servo(&config, &mut |_| {}).map(|found| (found.found.misfit, found.warnings))
+    };
+    let (of_robot, warnings) = elastic(", k1 = 333.333, k2 = 5.0, d = 0.6").unwrap();
+    assert!((of_robot - stated).abs() < 1e-9, "{of_robot} {stated}");
+    assert!(warnings.iter().any(|w| w.contains("cubic stiffness of `lift`")), "{warnings:?}");
+    let fault = elastic("").unwrap_err().to_string();
+    assert!(fault.contains("servo.gear_stiffness.lift"), "{fault}");
     for (more, part) in [
         ("gear_damping = { lift = 0.6 }\n", "servo.gear_damping.lift"),
         ("backlash = { elbow = 0.01 }\ngear_stiffness = { lift = 300 }\n", "servo.backlash.elbow"),
@@ -854,4 +866,47 @@ fn what_is_said_of_gears_takes_effect_or_is_refused() {
         let fault = misfit(more).unwrap_err().to_string();
         assert!(fault.contains(part), "{more}: {fault}");
     }
+}
+
+#[test]
+fn actuators_of_a_robot_file_are_its_baseline_and_their_range_is_that_of_commands() {
+    let folder = folder();
+    let config_of = |robot: &str, more: &str| {
+        let text = format!(
+            "robot = \"{robot}\"\nlock = {{ finger = 0.0 }}\n[[log]]\npath = \"a.csv\"\n[servo]\ndelay = 0.008\nlaw = [\"offset\"]\n{more}"
+        );
+        identify_servo(&config(&folder, &text), &mut |_| {}).unwrap()
+    };
+    let first = config_of("arm.urdf", "velocity_gain = 1.0\n");
+    assert!(first.as_it_came.is_none(), "a URDF states no gains");
+    let files = first.files().unwrap();
+    let written = &files.files.iter().find(|(name, _)| name == "arm.mujoco.xml").unwrap().1;
+    std::fs::write(folder.path().join("arm.xml"), written).unwrap();
+    let again = config_of("arm.xml", "");
+    // The file holds what was found, so that it predicts the log as it came.
+    for (file, (rms, command)) in
+        again.as_it_came.as_ref().unwrap().iter().zip(first.found.rms.iter().zip(&first.found.command_rms))
+    {
+        assert!(*file < 1.5 * rms && *file < 0.02 * command, "{file} {rms} {command}");
+    }
+    assert!(!again.warnings.iter().any(|w| w.contains("command_limits")), "{:?}", again.warnings);
+    // What is told goes farther than the elbow ever does.
+    let log = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let cells: Vec<Vec<&str>> = log.lines().map(|line| line.split(',').collect()).collect();
+    let most = cells[1..].iter().map(|row| row[4].parse::<f64>().unwrap().abs()).fold(0.05, f64::max) + 0.05;
+    let told = format!("{}", most + 0.3);
+    let told: Vec<String> = cells
+        .iter()
+        .enumerate()
+        .map(|(k, row)| {
+            let command = if k > 0 && k % 40 == 0 { told.as_str() } else { row[2] };
+            [row[0], row[1], command, row[3], row[4]].join(",")
+        })
+        .collect();
+    std::fs::write(folder.path().join("a.csv"), told.join("\n")).unwrap();
+    let ranged = format!("<general name=\"servo_elbow\" ctrlrange=\"-{most} {most}\"");
+    let narrow = written.replacen("<general name=\"servo_elbow\"", &ranged, 1);
+    std::fs::write(folder.path().join("narrow.xml"), narrow).unwrap();
+    let warnings = config_of("narrow.xml", "").warnings;
+    assert!(warnings.iter().any(|w| w.contains("command_limits = { elbow = [-")), "{warnings:?}");
 }
