@@ -119,6 +119,12 @@ fn introduction(file: &ServoFile) -> Vec<String> {
     } else {
         "bodies that deviate from those of the robot file as far as held-out folds ask for it"
     };
+    let soft = file.joints.iter().any(|j| of_gear(file, j).is_some());
+    let gears = if soft {
+        " Gears give way: a drive moves its rotor with all friction, and the link is moved by what the spring of its gear carries behind the backlash."
+    } else {
+        ""
+    };
     let hangs = if file.fit.efforts.iter().any(|e| e.rms.is_some()) {
         "Efforts or currents were measured, and are met together with the positions, each weighted by its own noise."
     } else {
@@ -127,7 +133,7 @@ fn introduction(file: &ServoFile) -> Vec<String> {
     vec![
         format!(
             "The robot is simulated in closed loop along the logged commands: `τ = k_p (s u + z - q) - k_d v` behind a delay, against rotor \
-             inertia, friction and {bodies}. The parameters are those whose simulation gives the measured positions."
+             inertia, friction and {bodies}.{gears} The parameters are those whose simulation gives the measured positions."
         ),
         format!(
             "Intervals are those of a jackknife over blocks of time, widened by what a value moves by with the step of the simulation, \
@@ -264,17 +270,14 @@ fn whole(file: &ServoFile) -> report::JointSection {
 
 /// What was found of the bodies, parameter by parameter.
 fn bodies(file: &ServoFile) -> StudyTable {
-    let digits = |x: f64| format!("{x:.4}");
     let rows = file.bodies.iter().flat_map(|body| {
         body.parameters.iter().map(|p| {
-            let interval =
-                p.interval.map_or(Value::Undefined, |(a, b)| text(format!("{} to {}", digits(a), digits(b))));
             vec![
                 text(body.link.clone()),
                 text(p.name.clone()),
                 Value::from(p.file),
                 Value::from(p.value),
-                interval,
+                Value::interval(p.interval),
                 text(p.unit.clone()),
                 text(if p.told { "yes" } else { "follows the robot file" }),
             ]
@@ -381,9 +384,7 @@ fn section(file: &ServoFile, j: usize, joint: &str, unit: &str, charts: Vec<Char
 
 fn parameter(p: &ServoParameterRecord) -> Vec<Value> {
     let shared = if p.joints.len() > 1 { " (shared)" } else { "" };
-    let digits = |x: f64| format!("{x:.4}");
-    let interval =
-        p.interval.map_or(Value::Undefined, |(a, b)| text(format!("{} to {}", digits(a), digits(b))));
+    let interval = Value::interval(p.interval);
     let ratio = p.per_gain.map_or(Value::Undefined, |(r, h)| text(format!("{r:.5} ± {h:.5}")));
     let s = p.spread;
     let moves = [

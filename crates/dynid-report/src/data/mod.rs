@@ -55,6 +55,7 @@ pub use study::{
 };
 pub use verdict::{Check, Status, Verdict, Warning};
 
+use crate::number;
 use serde::Serialize;
 
 /// Everything one report shows.
@@ -179,6 +180,16 @@ pub enum Value {
     Flag(bool),
     /// Anything else.
     Text(String),
+}
+
+impl Value {
+    /// An interval as text, its ends to two digits of its half width; undefined if there is none.
+    pub fn interval(interval: Option<(f64, f64)>) -> Self {
+        interval.map_or(Value::Undefined, |(low, high)| {
+            let (low, high) = number::interval(low, high);
+            Value::Text(format!("{low} to {high}"))
+        })
+    }
 }
 
 impl From<f64> for Value {
