@@ -475,7 +475,13 @@ impl DriveConfig {
         let direction = s.direction.finite("servo.direction", &names)?;
         let zero = s.zero.finite("servo.zero", &names)?;
         let delay = s.delay.not_negative("servo.delay", &names)?;
-        let gears = Gears::of(s, robot, &names)?;
+        out.find = s.find.iter().map(|f| f.term()).collect();
+        let gears = Gears {
+            stiffness: s.gear_stiffness.positive("servo.gear_stiffness", &names)?,
+            damping: s.gear_damping.not_negative("servo.gear_damping", &names)?,
+            backlash: s.backlash.not_negative("servo.backlash", &names)?,
+        };
+        let gears = gears.beside(robot, &names, &out.find, s.encoder == EncoderName::Link)?;
         for (joint, (low, high)) in &s.command_limits {
             if !names.contains(joint) {
                 return Err(Error::UnknownJoint { name: joint.clone(), known: names.clone() });
@@ -551,7 +557,6 @@ impl DriveConfig {
             DelaySharing::Own => Shared::Own,
         };
         out.zero_std = s.zero_std;
-        out.find = s.find.iter().map(|f| f.term()).collect();
         if let Some(law) = &s.law {
             out.choice = Choice::Given(law.iter().map(|l| l.addition()).collect());
         }

@@ -10,33 +10,31 @@ use dynid_robots::RobotFileError;
 use dynid_robots::mjcf::{self, GearJoint, JointParameters};
 use dynid_servo::{ServoJoint, Term};
 
-use super::config::{DriveConfig, EncoderName, FoundName};
-
 /// Stated numbers of gears, by joint.
 pub(crate) struct Gears {
-    stiffness: Vec<Option<f64>>,
-    damping: Vec<Option<f64>>,
-    backlash: Vec<Option<f64>>,
+    pub(crate) stiffness: Vec<Option<f64>>,
+    pub(crate) damping: Vec<Option<f64>>,
+    pub(crate) backlash: Vec<Option<f64>>,
 }
 
 impl Gears {
-    /// Of the joints of a robot.
+    /// With what the robot file states beside; `find`: terms that are to be found, `reads_link`: encoders sit on links.
     ///
     /// # Errors
-    /// [`Error::Setting`] for numbers that no gear has, what is said of gears that are stiff, and joints that the robot file calls elastic without their stiffness.
-    pub(crate) fn of(config: &DriveConfig, robot: &Robot, names: &[String]) -> Result<Self, Error> {
-        let mut out = Gears {
-            stiffness: config.gear_stiffness.positive("servo.gear_stiffness", names)?,
-            damping: config.gear_damping.not_negative("servo.gear_damping", names)?,
-            backlash: config.backlash.not_negative("servo.backlash", names)?,
-        };
+    /// [`Error::Setting`] for what is said of gears that are stiff, and joints that the robot file calls elastic without their stiffness.
+    pub(crate) fn beside(
+        mut self,
+        robot: &Robot,
+        names: &[String],
+        find: &[Term],
+        reads_link: bool,
+    ) -> Result<Self, Error> {
         for elastic in &robot.elements.elastic {
             let Some(j) = names.iter().position(|n| *n == elastic.joint) else { continue };
-            out.stiffness[j] = out.stiffness[j].or(elastic.k1);
-            out.damping[j] = out.damping[j].or(elastic.d);
+            self.stiffness[j] = self.stiffness[j].or(elastic.k1);
+            self.damping[j] = self.damping[j].or(elastic.d);
         }
-        let found = |term: FoundName| config.find.contains(&term);
-        let soft = |j: usize| out.stiffness[j].is_some() || found(FoundName::Compliance);
+        let soft = |j: usize| self.stiffness[j].is_some() || find.contains(&Term::Compliance);
         for elastic in &robot.elements.elastic {
             let at = names.iter().position(|n| *n == elastic.joint);
             if at.is_some_and(|j| !soft(j)) {
@@ -48,18 +46,18 @@ impl Gears {
         let any = (0..names.len()).any(soft);
         let expected =
             "`gear_stiffness` beside it, or `find = [\"compliance\"]`: it acts on gears that give way";
-        for (key, stated) in [("gear_damping", &out.damping), ("backlash", &out.backlash)] {
+        for (key, stated) in [("gear_damping", &self.damping), ("backlash", &self.backlash)] {
             if let Some(j) = (0..names.len()).find(|j| stated[*j].is_some_and(|x| x > 0.0) && !soft(*j)) {
                 return Err(Error::setting(&format!("servo.{key}.{}", names[j]), expected, "none"));
             }
         }
-        let idle = [
-            ("servo.encoder", config.encoder == EncoderName::Link),
-            ("servo.find", found(FoundName::GearDamping) || found(FoundName::Backlash)),
-        ];
-        match idle.into_iter().find(|(_, said)| *said && !any) {
+        let finds = find.contains(&Term::GearDamping) || find.contains(&Term::Backlash);
+        match [("servo.encoder", reads_link), ("servo.find", finds)]
+            .into_iter()
+            .find(|(_, said)| *said && !any)
+        {
             Some((key, _)) => Err(Error::setting(key, expected, "none")),
-            None => Ok(out),
+            None => Ok(self),
         }
     }
 

@@ -2,7 +2,6 @@
 
 use crate::free::ServoValues;
 use crate::joint::EncoderAt;
-use crate::step::Numbers;
 use crate::term::Term;
 
 /// A gear that gives way: between the coordinate of its drive `θ` and that of its link `q` it carries
@@ -23,9 +22,6 @@ pub(crate) struct Gear {
     /// Half of the backlash.
     pub(crate) play: f64,
 }
-
-/// Least inertia of a motor behind a gear that gives way, kg m² or kg: without any it would have no acceleration between the flanks.
-const LEAST_ROTOR: f64 = 1e-9;
 
 /// What a gear carries and its slopes.
 #[derive(Debug, Clone, Copy, Default)]
@@ -118,18 +114,5 @@ impl Layout {
     /// Whether every drive reads what it moves.
     pub(crate) fn is_symmetric(&self) -> bool {
         self.sensor == self.motor
-    }
-
-    /// Per coordinate the numbers of what moves it: of a drive, or none.
-    pub(crate) fn numbers(&self, joints: &[Numbers]) -> Vec<Numbers> {
-        let of = |c: usize| match self.driven[c] {
-            true if c >= self.links => {
-                let own = joints[self.joint[c]];
-                Numbers { rotor: own.rotor.max(LEAST_ROTOR), ..own }
-            }
-            true => joints[self.joint[c]],
-            false => Numbers::none(),
-        };
-        (0..self.len()).map(of).collect()
     }
 }

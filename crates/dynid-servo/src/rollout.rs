@@ -304,7 +304,7 @@ impl<'a> Run<'a> {
             rollout,
             n,
             p,
-            parts: layout.numbers(&joints),
+            parts: Numbers::by_coordinate(&layout, &joints),
             joints,
             commands: chain.joints.iter().map(shaped).collect(),
             equation: Equation::new(chain, &values.inertias),

@@ -38,6 +38,9 @@ const FREE_ROUNDS: usize = 8;
 /// Least change of a velocity, rad/s, that asks for another round.
 const CHANGE: f64 = 1e-11;
 
+/// Least inertia of a motor behind a gear that gives way, kg m² or kg: without any it would have no acceleration between the flanks.
+const LEAST_ROTOR: f64 = 1e-9;
+
 /// Numbers of one joint, unpacked.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Numbers {
@@ -83,9 +86,17 @@ impl Numbers {
         }
     }
 
-    /// Those of a link that no drive moves.
-    pub(crate) fn none() -> Self {
-        Numbers::of(&ServoJoint::default())
+    /// By coordinate those of what moves it: of a drive, or of none.
+    pub(crate) fn by_coordinate(layout: &Layout, joints: &[Numbers]) -> Vec<Numbers> {
+        let of = |c: usize| match layout.driven[c] {
+            true if c >= layout.links => {
+                let own = joints[layout.joint[c]];
+                Numbers { rotor: own.rotor.max(LEAST_ROTOR), ..own }
+            }
+            true => joints[layout.joint[c]],
+            false => Numbers::of(&ServoJoint::default()),
+        };
+        (0..layout.len()).map(of).collect()
     }
 
     /// Friction without load at a speed, and its slope over the speed.

@@ -27,7 +27,7 @@ pub(super) struct MovingJoint {
 /// What a joint element is.
 pub(super) enum JointElement {
     Free,
-    Moving(MovingJoint),
+    Moving(Box<MovingJoint>),
 }
 
 /// Reads a joint; `frame` is where frames around it put it.
@@ -95,7 +95,7 @@ pub(super) fn read(
         sticks: false,
         gear: None,
     };
-    Ok(JointElement::Moving(MovingJoint {
+    Ok(JointElement::Moving(Box::new(MovingJoint {
         kind,
         anchor: frame.rotation.mul_vec(fields.vector("pos")?) + frame.translation,
         axis: frame.rotation.mul_vec(axis.scale(1.0 / norm)),
@@ -103,7 +103,7 @@ pub(super) fn read(
         limits: Limits { position, velocity: None, effort },
         parameters,
         unit: unit(1.0),
-    }))
+    })))
 }
 
 /// A free joint may have none of what joints have here.
