@@ -669,7 +669,15 @@ impl ServoResult {
             p.term == Term::Compliance.name()
                 && matches!(p.verdict, ServoVerdict::AtBound | ServoVerdict::NotSeen)
         };
-        let stiff: Vec<String> = parameters.iter().filter(stiff).map(|p| p.joints.join(", ")).collect();
+        let mut stiff: Vec<String> = parameters.iter().filter(stiff).map(|p| p.joints.join(", ")).collect();
+        // Asked, and with none that the rows could show, or with which the simulation gets lost.
+        let names = self.robot.rate_names();
+        let asked = |j: &usize| {
+            let s = &self.settings;
+            s.find.contains(&Term::Compliance) && !s.known_gear[*j].contains(&Term::Compliance)
+        };
+        let without = |j: &usize| self.found.values.joints[*j].get(Term::Compliance) == 0.0;
+        stiff.extend((0..names.len()).filter(asked).filter(without).map(|j| names[j].clone()));
         if stiff.is_empty() {
             return Vec::new();
         }

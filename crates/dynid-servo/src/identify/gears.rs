@@ -263,8 +263,8 @@ impl Work<'_> {
                 } else {
                     vec![known]
                 };
-                // A gear that is stiff, and is not asked whether it is.
-                if !free.is_empty() && starts[0] > 0.0 {
+                // Not a gear that is stiff and is not asked whether it is, nor one of rows too slow to show any.
+                if !free.is_empty() && starts.first().is_some_and(|c| *c > 0.0) {
                     out.push(Candidate { joint: *joint, inertia, starts, free });
                 }
             }

@@ -336,3 +336,28 @@ fn stiff_gears_are_not_told_from_stiff_ones() {
     println!("{told} of {} told, at most {most:e}", 2 * machines);
     assert!(told as f64 <= 0.05 * 2.0 * machines as f64 + 1.0, "{told}");
 }
+
+/// Rows that come twice a second show no link that swings.
+#[test]
+fn rows_too_slow_for_any_gear_leave_them_stiff() {
+    let mechanism = arm(1.0);
+    let rows = 120;
+    let time: Vec<f64> = (0..rows).map(|k| 0.5 * k as f64).collect();
+    let wave = |rate: f64| time.iter().map(|t| 0.3 * (rate * t).sin()).collect::<Vec<f64>>();
+    let command = vec![wave(0.5), wave(0.7)];
+    let mut log = ServoLog::new("slow", time.clone(), command.clone(), command.clone());
+    log.start = Some(vec![0.0; 2]);
+    let joints = vec![joint(EncoderAt::Motor).with(Term::Compliance, 0.0); 2];
+    let values = ServoValues { joints: joints.clone(), inertias: mechanism.inertia_vector() };
+    let mut position = vec![Vec::new(); 2];
+    Rollout::new(&Chain::all(&mechanism)[0], Scheme { step_s: 1e-3, ..Scheme::default() }, &[])
+        .run(&values, &log, |row| {
+            (0..2).for_each(|j| position[j].push((row.reading[j] / 1e-3).round() * 1e-3))
+        })
+        .unwrap();
+    let log = ServoLog::new("slow", time, command, position);
+    let mut settings = ServoSettings::new(2);
+    settings.find = vec![Term::Compliance, Term::GearDamping];
+    let found = identify(&mechanism, &[log], &settings).unwrap();
+    assert!(found.values.joints.iter().all(|j| j.get(Term::Compliance) == 0.0));
+}
