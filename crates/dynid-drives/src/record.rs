@@ -13,7 +13,7 @@ use dynid_servo::fit::Ending;
 use dynid_servo::identify::{
     EffortUse, GroupKind, MISFIT, ServoBody, ServoGroup, ServoParameter, TOLD_DIRECTION,
 };
-use dynid_servo::{Addition, Channel, Free, Hold, LoadOf, Term};
+use dynid_servo::{Addition, Channel, EncoderAt, Free, Hold, LoadOf, Term};
 use serde::{Deserialize, Serialize};
 
 use super::config::{DriveConfig, ServoConfig};
@@ -678,13 +678,27 @@ impl ServoResult {
         };
         let without = |j: &usize| self.found.values.joints[*j].get(Term::Compliance) == 0.0;
         stiff.extend((0..names.len()).filter(asked).filter(without).map(|j| names[j].clone()));
-        if stiff.is_empty() {
-            return Vec::new();
+        let mut out = Vec::new();
+        let soft = parameters.iter().any(|p| p.term == Term::Compliance.name());
+        if soft && self.found.misfit > MISFIT {
+            let other = match self.settings.joints.first().map(|j| j.encoder) {
+                Some(EncoderAt::Link) => "motor",
+                _ => "link",
+            };
+            out.push(format!(
+                "with gears that give way the residual is {:.1} times the encoders' rounding: if encoders sit on the other side of the gears, say `encoder = \"{other}\"` in \
+                 `[servo]`",
+                self.found.misfit
+            ));
         }
-        vec![format!(
+        if stiff.is_empty() {
+            return out;
+        }
+        out.push(format!(
             "gears as stiff as the rows can show: {}; their links swing faster than half the rate of the rows, or hardly: move with steps or chirps, and log more often",
             stiff.join(", ")
-        )]
+        ));
+        out
     }
 
     /// What is to be said of bodies that were to be found.

@@ -796,6 +796,12 @@ fn a_gear_that_gives_way_goes_from_the_log_to_the_files_and_back() {
     let stiffness = table["joints"][0]["gear_stiffness"].as_f64().unwrap();
     assert!((stiffness * lift.value - 1.0).abs() < 1e-12, "{stiffness}");
     assert!(of("actuators.h").contains("dynid_compliance[DYNID_JOINTS]"));
+    let other = "encoder = \"link\"";
+    assert!(!file.warnings.iter().any(|w| w.contains(other)), "{:?}", file.warnings);
+    let wrong = config(&folder, &format!("{text}find = [\"compliance\", \"gear_damping\"]\n{other}\n"));
+    let wrong = identify_servo(&wrong, &mut |_| {}).unwrap().file(&wrong, &[]);
+    assert!(wrong.fit.misfit.unwrap() > 1.3, "{:?}", wrong.fit);
+    assert!(wrong.warnings.iter().any(|w| w.contains("encoder = \"motor\"")), "{:?}", wrong.warnings);
     let page = found.report(&file).unwrap();
     assert!(page.contains("gears that give way: lift") && page.contains("stiffness of the gear"));
 
