@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynid_identify::Error;
 use dynid_identify::robot::Robot;
-use dynid_model::{AddedInertia, Dynamics, JointKind, LoadedState, Mechanism, Vec3};
+use dynid_model::{AddedInertia, Description, Dynamics, JointKind, Mechanism};
 use dynid_robots::RobotFileError;
 use dynid_robots::mjcf::{self, GearJoint, JointParameters};
 use dynid_servo::{ServoJoint, Term};
@@ -103,8 +103,13 @@ pub(crate) fn placed(
         joints.iter().map(|j| JointParameters { gear: None, ..j.clone() }).collect();
     let robot = mjcf::parse(&write(&stiff)?, path)?;
     let named = |source| Error::Mechanism { file: path.display().to_string(), source };
-    let mechanism = robot.file.description.build().map_err(named)?;
-    let mobility: Vec<f64> = joints.iter().map(|j| mobility(&mechanism, &joints, &j.joint)).collect();
+    // Constraints between joints are none of the inertia that MuJoCo takes.
+    let description = Description { couple_mimics: false, ..robot.file.description };
+    let mechanism = description.build().map_err(named)?;
+    // Rotors of joints that no drive was found of are in the model too.
+    let others = robot.joints.into_iter().filter(|j| !joints.iter().any(|own| own.joint == j.joint));
+    let all: Vec<JointParameters> = joints.iter().cloned().chain(others).collect();
+    let mobility: Vec<f64> = joints.iter().map(|j| mobility(&mechanism, &all, &j.joint)).collect();
     for (joint, mobility) in joints.iter_mut().zip(mobility) {
         joint.gear.iter_mut().for_each(|gear| gear.mobility = mobility);
     }
@@ -132,16 +137,6 @@ fn mobility(mechanism: &Mechanism, joints: &[JointParameters], joint: &str) -> f
         }
     }
     let Some((own, rotor)) = own else { return f64::NAN };
-    let effort: Vec<f64> = (0..n).map(|k| if k == own { 1.0 } else { 0.0 }).collect();
-    let (still, mut ddq) = (vec![0.0; n], vec![0.0; n]);
-    let state = LoadedState { q: &q, dq: &still, effort: &effort, gravity: Some(Vec3::zero()) };
-    let mut work = dynamics.forward_workspace();
-    let solved = dynamics.forward_dynamics(
-        &state,
-        &mechanism.inertia_vector(),
-        AddedInertia::Diagonal(&rotors),
-        &mut work,
-        &mut ddq,
-    );
-    solved.map_or(f64::NAN, |()| ddq[own] + 1.0 / rotor)
+    let added = AddedInertia::Diagonal(&rotors);
+    dynamics.mobility(&q, &mechanism.inertia_vector(), added, own).map_or(f64::NAN, |link| link + 1.0 / rotor)
 }

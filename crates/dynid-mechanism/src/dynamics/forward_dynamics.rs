@@ -65,6 +65,29 @@ impl Dynamics {
         }
     }
 
+    /// Acceleration of a rate per effort on it at rest without gravity, all other rates free: entry `rate` of the diagonal of `(M(q) + added)⁻¹`, 1/(kg m²) or
+    /// 1/kg.
+    ///
+    /// # Errors
+    /// As [`Dynamics::forward_dynamics`].
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn mobility(
+        &self,
+        q: &[f64],
+        inertias: &[f64],
+        added: AddedInertia<'_, f64>,
+        rate: usize,
+    ) -> Result<f64, NotPositive> {
+        let (still, mut ddq) = (vec![0.0; self.rates], vec![0.0; self.rates]);
+        let mut effort = still.clone();
+        effort[rate] = 1.0;
+        let state = LoadedState { q, dq: &still, effort: &effort, gravity: Some(Vec3::zero()) };
+        self.forward_dynamics(&state, inertias, added, &mut self.forward_workspace(), &mut ddq)?;
+        Ok(ddq[rate])
+    }
+
     /// Accelerations `q̈` with `(M(q) + added) q̈ + h(q, q̇) = effort`: the inverse of [`Dynamics::inverse_dynamics`].
     ///
     /// `inertias`: ten standard parameters per body in file order. Trees without coupled joints and without a full added

@@ -80,6 +80,39 @@ fn both_ways_to_the_acceleration_agree() {
 }
 
 #[test]
+fn mobility_is_the_acceleration_per_effort() {
+    for (seed, mechanism) in trees() {
+        let (n, m) = (mechanism.rates(), motion(&mechanism, seed));
+        let (diagonal, _) = added_inertia(n, seed);
+        let (dynamics, phi, still) = (Dynamics::new(&mechanism), mechanism.inertia_vector(), vec![0.0; n]);
+        for rate in 0..n {
+            let of =
+                |added: &[f64]| dynamics.mobility(&m.q, &phi, AddedInertia::Diagonal(added), rate).unwrap();
+            let mut effort = still.clone();
+            let with = |effort: &[f64]| {
+                let added = AddedInertia::Diagonal(&diagonal);
+                accelerations(&mechanism, (&m.q, &still), effort, added).unwrap()[rate]
+            };
+            let falls = with(&effort);
+            effort[rate] = 1.0;
+            let found = of(&diagonal);
+            let wanted = with(&effort) - falls;
+            assert!(
+                (found / wanted - 1.0).abs() < 1e-9 * (1.0 + falls.abs() / wanted),
+                "tree {seed}, rate {rate}"
+            );
+            // One more inertia at the rate itself (Sherman and Morrison 1950).
+            let mut more = diagonal.clone();
+            more[rate] += 0.7;
+            assert!(
+                (of(&more) / (found / (1.0 + 0.7 * found)) - 1.0).abs() < 1e-9,
+                "tree {seed}, rate {rate}"
+            );
+        }
+    }
+}
+
+#[test]
 fn coupled_joints_follow_their_leaders() {
     for seed in 0..TREES {
         let mut d = tree(6, seed);
