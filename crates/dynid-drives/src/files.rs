@@ -78,7 +78,7 @@ impl ServoResult {
     ///
     /// | file | what |
     /// |---|---|
-    /// | `NAME.urdf`, `NAME.xml` (MJCF) | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, inertias where they were found, else byte for byte |
+    /// | `NAME.urdf`, `NAME.xml` (MJCF) | the robot file with `damping`, `frictionloss` (URDF: `friction`) and `armature`, inertias where they were found, else byte for byte; in MJCF gears that give way as joints `<joint>_gear`, and dry friction that sticks |
     /// | `NAME.mujoco.xml` | for robots that are no MJCF: the robot in MJCF with its actuators |
     /// | `actuators.xml` | MJCF `<actuator>`: one affine actuator per joint, for `<include>` |
     /// | `actuators.json` | stiffness, damping, armature, friction, limits, delay, zero and direction by joint, for simulators of many robots |
