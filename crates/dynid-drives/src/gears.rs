@@ -107,8 +107,12 @@ pub(crate) fn placed(
     let description = Description { couple_mimics: false, ..robot.file.description };
     let mechanism = description.build().map_err(named)?;
     // Rotors of joints that no drive was found of are in the model too.
-    let others = robot.joints.into_iter().filter(|j| !joints.iter().any(|own| own.joint == j.joint));
-    let all: Vec<JointParameters> = joints.iter().cloned().chain(others).collect();
+    let all: Vec<(JointParameters, f64)> = robot
+        .joints
+        .into_iter()
+        .zip(robot.drawn)
+        .map(|(p, drawn)| (joints.iter().find(|own| own.joint == p.joint).cloned().unwrap_or(p), drawn))
+        .collect();
     let mobility: Vec<f64> = joints.iter().map(|j| mobility(&mechanism, &all, &j.joint)).collect();
     for (joint, mobility) in joints.iter_mut().zip(mobility) {
         joint.gear.iter_mut().for_each(|gear| gear.mobility = mobility);
@@ -116,24 +120,27 @@ pub(crate) fn placed(
     Ok(joints)
 }
 
-/// Acceleration of the link of a gear that gives way against its motor per effort between them, all other joints and gears free, at zero.
-fn mobility(mechanism: &Mechanism, joints: &[JointParameters], joint: &str) -> f64 {
+/// Acceleration of the link of a gear that gives way against its motor per effort between them, all other joints and gears free, where the model is as drawn;
+/// `joints`: those of the model with their positions there.
+fn mobility(mechanism: &Mechanism, joints: &[(JointParameters, f64)], joint: &str) -> f64 {
     let dynamics = Dynamics::new(mechanism);
-    let n = mechanism.joint_rates();
     let mut q = Vec::with_capacity(mechanism.joint_positions());
-    let mut rotors = vec![0.0; n];
+    let mut rotors = vec![0.0; mechanism.joint_rates()];
     let mut own = None;
     for body in mechanism.bodies() {
-        match body.joint.kind {
-            JointKind::Floating => q.extend([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
-            _ => q.extend(std::iter::repeat_n(0.0, body.joint.positions())),
+        if body.joint.kind == JointKind::Floating {
+            q.extend([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+            continue;
         }
-        if let Some(p) = joints.iter().find(|p| p.joint == body.joint.name) {
-            // The rotor of a gear that gives way is on its other side.
-            rotors[body.rate] = if p.gear.is_none() { p.armature } else { 0.0 };
-            if p.joint == joint {
-                own = Some((body.rate, p.armature));
-            }
+        let Some((p, drawn)) = joints.iter().find(|(p, _)| p.joint == body.joint.name) else {
+            q.extend(std::iter::repeat_n(0.0, body.joint.positions()));
+            continue;
+        };
+        q.push(*drawn);
+        // The rotor of a gear that gives way is on its other side.
+        rotors[body.rate] = if p.gear.is_none() { p.armature } else { 0.0 };
+        if p.joint == joint {
+            own = Some((body.rate, p.armature));
         }
     }
     let Some((own, rotor)) = own else { return f64::NAN };

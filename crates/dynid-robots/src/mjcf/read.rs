@@ -26,6 +26,8 @@ pub struct MjcfRobot {
     pub description: Description,
     /// What the moving joints state besides, in the order of the file.
     pub joints: Vec<JointParameters>,
+    /// Positions of these joints where the model is as drawn (`ref`), rad or m, in the same order.
+    pub drawn: Vec<f64>,
     /// Position loops that actuators close: `<position>` and `<general>` that says the same, of gear 1.
     pub position_actuators: Vec<PositionActuator>,
     /// The robot with what it says of elements, loops and sources.
@@ -63,6 +65,7 @@ pub fn parse_edited(text: &str, path: &Path, changed: &[EditedFile]) -> Result<M
     let files = document.files.iter().map(|f| f.name.clone()).collect();
     let sources = [document.sources.clone(), meshes].concat();
     Ok(MjcfRobot {
+        drawn: model.joints.iter().map(|j| j.zero).collect(),
         joints: model.joints.into_iter().map(|j| j.parameters).collect(),
         position_actuators: model.position_actuators,
         file: RobotFile {

@@ -322,13 +322,16 @@ fn the_outermost_element_tells_the_kind_of_file() {
 fn position_loops_of_actuators_are_kept() {
     let text = "<mujoco><default><position kp='40' kv='1.5'/><default class='weak'><position kp='10'/></default></default>
       <worldbody><body><joint name='a'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
-      <body><joint name='b'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
+      <body><joint name='b' ref='90'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
       <body><joint name='c'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>
       <body><joint name='d'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></body></body></body></worldbody>
       <actuator><position joint='a' class='weak' ctrlrange='-1 1.5' forcerange='-6 6'/>
       <general joint='b' biastype='affine' gainprm='20' biasprm='0.5 -20 -2'/>
       <motor joint='c' ctrlrange='-3 3'/><position joint='d' gear='2'/></actuator></mujoco>";
-    let found = mjcf::parse(text, "m.xml").unwrap().position_actuators;
+    let read = mjcf::parse(text, "m.xml").unwrap();
+    // Degrees, as the file has them.
+    assert_eq!(read.drawn, [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0]);
+    let found = read.position_actuators;
     let [a, b] = &found[..] else { panic!("{found:?}") };
     assert_eq!((a.joint.as_str(), a.position_gain, a.velocity_gain, a.offset), ("a", 10.0, 1.5, 0.0));
     assert_eq!((a.command_limits, a.effort_limit), (Some((-1.0, 1.5)), Some(6.0)));
