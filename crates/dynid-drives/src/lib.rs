@@ -129,7 +129,7 @@ impl Fault for ServoFault {
             ServoFault::NoJoint { .. } => "name the columns of positions: `[columns]` with `position`".to_owned(),
             ServoFault::File { .. } => "give the `servo.json` of the output folder of `dynid servo`".to_owned(),
             ServoFault::Fit(ServoError::Lost(_)) => {
-                "check signs and units: state `direction`, `position_gain` and `velocity_gain` in `[servo]`".to_owned()
+                "check signs and units: state `direction`, `position_gain` and `velocity_gain` in `[servo]`; of gears that rattle between their flanks, more `gear_damping` or no `backlash`".to_owned()
             }
             ServoFault::Fit(_) => return None,
         })

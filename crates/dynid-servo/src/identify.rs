@@ -141,6 +141,7 @@ pub fn identify(
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
     work.forget_starts(&begin);
+    work.follow_gears(&begin);
     let mut free = work.free(&laws);
     let mut fitted = work.first_fit(&free, begin, &GaussNewton::default())?;
     if work.leave_out(&fitted, 0)? {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use super::{Folds, Work};
+use super::{Folds, HALVINGS, Work};
 use crate::chain::{Chain, Equation};
 use crate::fit::{Evaluation, Fitted, GaussNewton, fit};
 use crate::free::{Free, ServoValues};
@@ -165,6 +165,24 @@ impl Work<'_> {
         for (log, least) in self.logs.iter_mut().zip(&self.settle_s) {
             let span = log.time.last().zip(log.time.first()).map_or(0.0, |(b, a)| b - a);
             log.settle_s = least.max((FORGOTTEN * slowest).min(MOST_FORGOTTEN * span));
+        }
+    }
+
+    /// Steps that follow links on gears that are known, a radian of their swinging at most, as far as halvings go: longer ones get lost between flanks.
+    pub(super) fn follow_gears(&mut self, values: &ServoValues) {
+        let mut fastest = 0.0_f64;
+        for chain in self.chains {
+            for (at, j) in chain.joints.iter().enumerate() {
+                let compliance = values.joints[*j].get(Term::Compliance);
+                if compliance > 0.0 {
+                    fastest = fastest.max((compliance * self.inertia(chain, at, values)).sqrt().recip());
+                }
+            }
+        }
+        for _ in 0..HALVINGS {
+            if self.settings.step_s.is_none() && fastest * self.scheme.step_s > 1.0 {
+                self.scheme.step_s *= 0.5;
+            }
         }
     }
 

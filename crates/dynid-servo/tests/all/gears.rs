@@ -361,3 +361,34 @@ fn rows_too_slow_for_any_gear_leave_them_stiff() {
     let found = identify(&mechanism, &[log], &settings).unwrap();
     assert!(found.values.joints.iter().all(|j| j.get(Term::Compliance) == 0.0));
 }
+
+/// Gears whose links swing far faster than rows come: steps of a row get lost between the flanks, and shorter ones are taken.
+#[test]
+fn stiff_gears_with_backlash_take_shorter_steps_than_rows() {
+    let mechanism = arm(1.0);
+    let (mut lost, mut worst) = (0, 0.0_f64);
+    for seed in 0..2 {
+        let mut truth = drives(&mut ChaCha8Rng::seed_from_u64(seed));
+        for joint in &mut truth {
+            joint.set(Term::Compliance, 5e-5);
+            joint.set(Term::GearDamping, 4.0);
+            joint.set(Term::Backlash, 0.01);
+        }
+        let scheme = Scheme { step_s: PERIOD / 128.0, ..Scheme::default() };
+        let logs = [log_of(&mechanism, &truth, scheme, 1600, seed)];
+        let mut settings = ServoSettings::new(2);
+        settings.own_gains = true;
+        settings.choice = Choice::Given(vec![Addition::Zero]);
+        for (known, truth) in settings.joints.iter_mut().zip(&truth) {
+            for term in [Term::VelocityGain, Term::Compliance, Term::GearDamping, Term::Backlash] {
+                known.set(term, truth.get(term));
+            }
+        }
+        let found = identify(&mechanism, &logs, &settings).unwrap();
+        worst = worst.max(found.misfit);
+        settings.step_s = Some(1.1 * PERIOD);
+        lost += usize::from(identify(&mechanism, &logs, &settings).is_err());
+    }
+    println!("{lost} lost, worst misfit {worst}");
+    assert!(lost > 0 && worst < 1.3, "{lost} {worst}");
+}
